@@ -1,0 +1,5 @@
+//! The viewer's pinhole (the *eye*) and the continuous 3-ray cameras of the mirrors.
+
+pub mod eye;
+
+pub use eye::Eye;

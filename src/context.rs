@@ -1,0 +1,45 @@
+//! Cancellation and progress, handed down to everything that can take longer than a moment.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::error::{Error, Result};
+
+/// Receives progress. The command line draws bars, the viewer its own, tests nothing.
+pub trait Progress: Send + Sync {
+    /// `stage` is a short name ("sampling"); `done` runs from 0 to 1.
+    fn report(&self, stage: &str, done: f64);
+}
+
+/// What long work is given: whether to go on, and where to say how far it is.
+#[derive(Clone, Default)]
+pub struct Context {
+    cancel: Arc<AtomicBool>,
+    progress: Option<Arc<dyn Progress>>,
+}
+
+impl Context {
+    /// A context that reports to `progress`.
+    pub fn new(progress: Arc<dyn Progress>) -> Self {
+        Self { cancel: Arc::default(), progress: Some(progress) }
+    }
+
+    /// The flag that cancels everything that was given this context.
+    pub fn cancel_flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.cancel)
+    }
+
+    /// Reports that `stage` is at `done` (0 to 1).
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] once the work was cancelled.
+    pub fn step(&self, stage: &str, done: f64) -> Result<()> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(Error::Cancelled);
+        }
+        if let Some(progress) = &self.progress {
+            progress.report(stage, done);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,150 @@
+//! A scene as its author means it: meshes, colours, transforms, eye and light. Nothing is prepared yet.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use crate::geometry::{Mesh, Similarity};
+
+/// A scene to be prepared. World space: right-handed, y up unless the eye says otherwise, f64.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Short name for reports.
+    pub name: String,
+    /// Where it is seen from.
+    pub eye: EyeDescription,
+    /// Curved mirrors.
+    pub mirrors: Vec<Mirror>,
+    /// Diffuse things.
+    pub objects: Vec<Object>,
+    /// What rays meet that meet nothing else.
+    pub environment: Environment,
+    /// The sun and the ambient light.
+    pub light: Light,
+}
+
+/// The viewer's pinhole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EyeDescription {
+    /// World space.
+    pub position: DVec3,
+    /// The point in the middle of the picture, world space.
+    pub target: DVec3,
+    /// Roughly upward; not parallel to the view.
+    pub up: DVec3,
+    /// Vertical field of view in radians, more than 0 and less than π.
+    pub fov_y: f64,
+}
+
+/// A perfectly specular mesh with smooth normals.
+#[derive(Clone, Debug)]
+pub struct Mirror {
+    /// Name for reports and `--where`.
+    pub name: String,
+    /// Local space.
+    pub mesh: Arc<Mesh>,
+    /// Local to world.
+    pub transform: Similarity,
+    /// Linear RGB factor of what is reflected.
+    pub tint: Vec3,
+}
+
+/// A diffuse mesh.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// Name for reports and `--where object=NAME`.
+    pub name: String,
+    /// Local space.
+    pub mesh: Arc<Mesh>,
+    /// Local to world.
+    pub transform: Similarity,
+    /// Its colour.
+    pub paint: Paint,
+    /// Surfels per area relative to the other objects; 1 by default.
+    pub density: f64,
+}
+
+/// Where the colour (linear RGB reflectance) of a surface point comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Paint {
+    /// The mesh's vertex colours, interpolated.
+    Vertex,
+    /// The same everywhere.
+    Constant(Vec3),
+    /// Two colours by the position in local space.
+    Pattern {
+        /// Which pattern.
+        kind: PatternKind,
+        /// Its two colours.
+        colors: [Vec3; 2],
+        /// Length of a period in local units.
+        period: f32,
+    },
+}
+
+/// Solid patterns: functions of the local position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PatternKind {
+    /// Alternating cubes.
+    Checker,
+    /// Bands along local y.
+    Stripes,
+    /// Rings about the local y axis.
+    Rings,
+}
+
+impl Paint {
+    /// The colour at a point of a mesh.
+    ///
+    /// `triangle` and `weights` say where it is (for vertex colours), `position` is the same point in local
+    /// space (for patterns). Meshes without vertex colours are white.
+    pub fn color(&self, mesh: &Mesh, triangle: usize, weights: [f32; 3], position: Vec3) -> Vec3 {
+        match *self {
+            Self::Vertex if mesh.colors().is_empty() => Vec3::ONE,
+            Self::Vertex => {
+                let corner = mesh.triangles()[triangle].map(|i| mesh.colors()[i as usize]);
+                corner[0] * weights[0] + corner[1] * weights[1] + corner[2] * weights[2]
+            }
+            Self::Constant(color) => color,
+            Self::Pattern { kind, colors, period } => {
+                // A hair off the origin, so that a face at a multiple of the period is not noise.
+                let p = position / period + Vec3::splat(1.0e-4);
+                let odd = match kind {
+                    PatternKind::Checker => {
+                        (p.x.floor() + p.y.floor() + p.z.floor()).rem_euclid(2.0) >= 1.0
+                    }
+                    PatternKind::Stripes => p.y.rem_euclid(2.0) >= 1.0,
+                    PatternKind::Rings => p.x.hypot(p.z).rem_euclid(2.0) >= 1.0,
+                };
+                colors[usize::from(odd)]
+            }
+        }
+    }
+}
+
+/// What a ray meets that meets nothing else: a function of its direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Environment {
+    /// The same everywhere, linear RGB.
+    Constant(Vec3),
+    /// A clear sky: zenith and horizon colours, a ground colour below the horizon and the sun's disc.
+    Sky {
+        /// Straight up, linear RGB.
+        zenith: Vec3,
+        /// At the horizon, linear RGB.
+        horizon: Vec3,
+        /// Below the horizon, linear RGB.
+        ground: Vec3,
+    },
+}
+
+/// One distant sun and an ambient term.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Towards the sun, unit, world space.
+    pub to_sun: Vec3,
+    /// Linear RGB factor of max(n·l, 0).
+    pub sun: Vec3,
+    /// Linear RGB factor everywhere.
+    pub ambient: Vec3,
+}

@@ -1,0 +1,3 @@
+//! What is to be rendered: read, made or given, then sampled, shaded and sorted into trees.
+
+pub mod description;
