@@ -1,5 +1,6 @@
 //! Catoptric: accurate reflections on curved mirrors without ray-tracing hardware.
 
+pub mod accel;
 pub mod camera;
 pub mod context;
 pub mod error;

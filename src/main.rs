@@ -1,2 +1,141 @@
-//! The command line.
-fn main() {}
+//! The command line: see `catoptric --help`.
+
+mod commands;
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::Ordering;
+
+use catoptric::{Context, Error, Progress};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use commands::bench::{BenchArgs, What};
+use commands::render::{HowArgs, RenderArgs};
+use commands::{SceneArgs, with_method_flags};
+
+/// Accurate reflections on curved mirrors, without ray-tracing hardware
+///
+/// Without a command: the built-in scene, as a picture.
+#[derive(Parser, Debug)]
+#[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Verb>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Verb {
+    Render(Box<RenderArgs>),
+    Compare(commands::compare::CompareArgs),
+    Info(commands::info::InfoArgs),
+    Bench(Box<BenchArgs>),
+}
+
+fn main() -> ExitCode {
+    let command = Cli::command()
+        .mut_subcommand("render", with_method_flags)
+        .mut_subcommand("bench", |bench| bench.mut_subcommand("layer", with_method_flags));
+    let matches = command.get_matches();
+    let cli = match Cli::from_arg_matches(&matches) {
+        Ok(cli) => cli,
+        Err(error) => error.exit(),
+    };
+    let bars = Arc::new(Bars::default());
+    let cx = Context::new(Arc::clone(&bars) as Arc<dyn Progress>);
+    let cancel = cx.cancel_flag();
+    // A second Ctrl-C does not wait for the stage to end; outputs are renamed into place, so none is broken.
+    let handler = ctrlc::set_handler(move || {
+        if cancel.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    let done = handler.map_err(Into::into).and_then(|()| run(&cli, &matches, &cx));
+    bars.end();
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if matches!(error.downcast_ref(), Some(Error::Cancelled)) => {
+            eprintln!("cancelled: nothing was written");
+            ExitCode::from(130)
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(cli: &Cli, matches: &clap::ArgMatches, cx: &Context) -> anyhow::Result<()> {
+    let verb = matches.subcommand().map(|(_, own)| own);
+    match (&cli.command, verb) {
+        (Some(Verb::Render(args)), Some(own)) => commands::render::run(args, own, cx),
+        (Some(Verb::Compare(args)), _) => commands::compare::run(args),
+        (Some(Verb::Info(args)), _) => commands::info::run(args, cx),
+        (Some(Verb::Bench(args)), Some(own)) => {
+            let What::Layer(layer) = &args.what;
+            let own = own.subcommand().map_or(own, |(_, own)| own);
+            commands::bench::layer(layer, own, cx)
+        }
+        _ => built_in_scene(cx),
+    }
+}
+
+/// What the program does if it is told nothing.
+fn built_in_scene(cx: &Context) -> anyhow::Result<()> {
+    let args = RenderArgs {
+        scene: SceneArgs::default_scene(),
+        how: HowArgs { method: "c3rc".into(), backend: "auto".into(), preset: None },
+        output: "catoptric.png".into(),
+        aov: None,
+        json: None,
+        repeat: 1,
+    };
+    println!("Rendering the built-in scene to a picture (this version has no viewer window).");
+    commands::render::run(&args, &clap::ArgMatches::default(), cx)?;
+    let place = std::path::absolute(&args.output)?;
+    println!("The picture is {}. Try `catoptric render --help` next.", place.display());
+    Ok(())
+}
+
+/// A bar on standard error for the stage under way; nothing where that is not a terminal.
+#[derive(Default)]
+struct Bars(Mutex<Option<(String, ProgressBar)>>);
+
+impl Bars {
+    fn end(&self) {
+        if let Ok(mut open) = self.0.lock()
+            && let Some((_, bar)) = open.take()
+        {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Steps of a bar.
+const STEPS: f64 = 1000.0;
+
+impl Progress for Bars {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to STEPS")]
+    fn report(&self, stage: &str, done: f64) {
+        if !std::io::stderr().is_terminal() {
+            return;
+        }
+        let Ok(mut open) = self.0.lock() else { return };
+        let same = open.as_ref().is_some_and(|(name, _)| name == stage);
+        if !same {
+            if let Some((_, bar)) = open.take() {
+                bar.finish_and_clear();
+            }
+            let style = ProgressStyle::with_template("{msg:>16} [{bar:40}] {eta}");
+            let bar = ProgressBar::new(STEPS as u64)
+                .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+                .with_message(stage.to_owned());
+            *open = Some((stage.to_owned(), bar));
+        }
+        if let Some((_, bar)) = open.as_ref() {
+            bar.set_position((done.clamp(0.0, 1.0) * STEPS) as u64);
+        }
+    }
+}

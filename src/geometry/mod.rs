@@ -1,6 +1,7 @@
 //! Shapes and numbers: nothing in here knows of mirrors or cameras.
 
 pub mod aabb;
+pub mod lanes;
 pub mod mesh;
 pub mod surfel;
 pub mod transform;

@@ -1,0 +1,129 @@
+//! The tree as it is walked: eight children a node, side by side for vector tests.
+
+use glam::Vec3;
+
+use super::Node;
+use crate::geometry::Aabb;
+
+/// Children of a wide node.
+pub const CHILDREN: usize = 8;
+
+/// Eight boxes and what is in them. Unused ones are empty (count 0).
+#[derive(Clone, Copy, Debug)]
+pub struct WideNode {
+    /// Middles by axis.
+    pub center: [[f32; CHILDREN]; 3],
+    /// Half edge lengths by axis, rounded up so that the box is never smaller than the node's.
+    pub half: [[f32; CHILDREN]; 3],
+    /// First surfel of each child.
+    pub first: [u32; CHILDREN],
+    /// Number of surfels of each child.
+    pub count: [u32; CHILDREN],
+    /// Wide node of each child; 0 for a leaf.
+    pub child: [u32; CHILDREN],
+    /// Bit i: child i is used.
+    pub used: u64,
+}
+
+impl WideNode {
+    /// No children.
+    pub const EMPTY: Self = Self {
+        center: [[0.0; CHILDREN]; 3],
+        half: [[0.0; CHILDREN]; 3],
+        first: [0; CHILDREN],
+        count: [0; CHILDREN],
+        child: [0; CHILDREN],
+        used: 0,
+    };
+
+    /// Puts a box into a slot.
+    pub fn set_box(&mut self, slot: usize, bounds: Aabb) {
+        let center = bounds.center();
+        // Half a box by rounded numbers: a hair more than the larger distance to a face.
+        let half = (bounds.max - center).max(center - bounds.min) * (1.0 + 2.0 * f32::EPSILON);
+        for axis in 0..3 {
+            self.center[axis][slot] = center[axis];
+            self.half[axis][slot] = half[axis];
+        }
+        self.used |= 1 << slot;
+    }
+
+    /// The box in a slot, not smaller than what was put there.
+    pub fn get_box(&self, slot: usize) -> Aabb {
+        let at = |lists: &[[f32; CHILDREN]; 3]| Vec3::from_array([0, 1, 2].map(|k| lists[k][slot]));
+        let (center, half) = (at(&self.center), at(&self.half));
+        Aabb { min: center - half, max: center + half }
+    }
+}
+
+/// Takes up to three binary levels together.
+pub(super) fn collapse(nodes: &[Node]) -> Vec<WideNode> {
+    let mut wide = vec![WideNode::EMPTY];
+    // (wide node, the binary node whose descendants it holds)
+    let mut open = vec![(0usize, 0usize)];
+    while let Some((at, root)) = open.pop() {
+        let children = descendants(nodes, root);
+        for (slot, &index) in children.iter().enumerate() {
+            let node = &nodes[index];
+            let child = if node.right == 0 { 0 } else { wide.len() };
+            if child != 0 {
+                wide.push(WideNode::EMPTY);
+                open.push((child, index));
+            }
+            wide[at].set_box(slot, node.bounds);
+            wide[at].first[slot] = node.first;
+            wide[at].count[slot] = node.count;
+            wide[at].child[slot] = u32::try_from(child).expect("fewer nodes than surfels");
+        }
+    }
+    wide
+}
+
+/// Up to eight descendants that share out a node's surfels, in order. The node itself if it is a leaf.
+fn descendants(nodes: &[Node], root: usize) -> Vec<usize> {
+    let mut list = vec![root];
+    while list.len() < CHILDREN {
+        let inner = |&slot: &usize| nodes[list[slot]].right != 0;
+        // The fullest first: leaves of the same depth end up side by side.
+        let fullest = (0..list.len())
+            .filter(inner)
+            .max_by_key(|&slot| (nodes[list[slot]].count, std::cmp::Reverse(slot)));
+        let Some(slot) = fullest else { break };
+        let index = list[slot];
+        list.splice(slot..=slot, [index + 1, index + nodes[index].right as usize]);
+    }
+    list
+}
+
+pub(super) fn validate(wide: &[WideNode], nodes: &[Node]) -> Result<(), String> {
+    let mut next = 0;
+    let mut open = vec![(0usize, 0usize)];
+    while let Some((at, slot)) = open.pop() {
+        let node = &wide[at];
+        if slot == CHILDREN {
+            continue;
+        }
+        open.push((at, slot + 1));
+        if node.used >> slot & 1 == 0 {
+            continue;
+        }
+        if node.child[slot] != 0 {
+            open.push((node.child[slot] as usize, 0));
+            continue;
+        }
+        if node.first[slot] != next {
+            return Err(format!("wide leaf {at}/{slot} starts at {} not {next}", node.first[slot]));
+        }
+        next += node.count[slot];
+        let (first, count) = (node.first[slot], node.count[slot]);
+        let binary = nodes.iter().find(|n| n.right == 0 && n.first == first && n.count == count);
+        let inside = binary.is_some_and(|n| {
+            let outer = node.get_box(slot);
+            outer.contains(n.bounds.min) && outer.contains(n.bounds.max)
+        });
+        if !inside {
+            return Err(format!("the box of wide leaf {at}/{slot} is too small"));
+        }
+    }
+    if next == nodes[0].count { Ok(()) } else { Err(format!("{next} surfels in wide leaves")) }
+}

@@ -1,0 +1,121 @@
+//! What was seen at every pixel, re-derived from the winning keys by the same projection.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::splat::{EMPTY, Projection};
+use crate::camera::three_ray::project;
+use crate::image::{NONE, Planes, Reason};
+use crate::plan::SplatPass;
+use crate::scene::prepared::PreparedScene;
+use crate::visibility::Visibility;
+
+/// One pixel's entries.
+struct Seen {
+    pixel: usize,
+    surfel: u32,
+    object: u32,
+    lambda: f32,
+    splat: [f32; 2],
+    images: u32,
+}
+
+/// Which mirror triangle each pixel belongs to, and that it shows the environment until something lands there.
+pub(crate) fn mark_mirrors(scene: &PreparedScene, visibility: &Visibility, planes: &mut Planes) {
+    for (pixel, &id) in visibility.mirror_ids.iter().enumerate() {
+        if id != crate::visibility::NONE_ID {
+            let (mirror, triangle) = scene.mirror_of(id);
+            planes.mirror[pixel] = u32::try_from(mirror).unwrap_or(NONE);
+            planes.mirror_triangle[pixel] = u32::try_from(triangle).unwrap_or(NONE);
+            planes.reason[pixel] = Reason::Environment as u32;
+        }
+    }
+}
+
+/// Fills in what the surfels in `keys` say.
+pub(crate) fn splat_planes(
+    pass: &SplatPass<'_>,
+    scene: &PreparedScene,
+    visibility: &Visibility,
+    keys: &[AtomicU64],
+    planes: &mut Planes,
+) {
+    let lists: Vec<Vec<Seen>> = (0..pass.patches.len())
+        .into_par_iter()
+        .map(|index| of_patch(pass, scene, visibility, keys, index))
+        .collect();
+    for seen in lists.into_iter().flatten() {
+        let object = &scene.objects[seen.object as usize];
+        let position = scene.surfels.position(seen.surfel as usize).as_dvec3();
+        let normal = scene.surfels.normals[seen.surfel as usize].as_dvec3();
+        let i = seen.pixel;
+        let world = object.to_scene.point(position) + scene.origin;
+        planes.position[i] = world.as_vec3().to_array();
+        planes.normal[i] = object.to_scene.direction(normal).as_vec3().to_array();
+        planes.lambda[i] = seen.lambda;
+        planes.splat[i] = seen.splat;
+        planes.coverage[i] = 1.0;
+        planes.object[i] = seen.object;
+        planes.surfel[i] = seen.surfel;
+        planes.images[i] = seen.images;
+        planes.reason[i] = Reason::Object as u32;
+    }
+}
+
+fn of_patch(
+    pass: &SplatPass<'_>,
+    scene: &PreparedScene,
+    visibility: &Visibility,
+    keys: &[AtomicU64],
+    index: usize,
+) -> Vec<Seen> {
+    let patch = &pass.patches[index];
+    let width = visibility.size.width;
+    let cameras = pass.patch_cameras[index] as usize..pass.patch_cameras[index + 1] as usize;
+    let mut list = Vec::new();
+    for y in patch.rect.min[1]..patch.rect.max[1] {
+        for x in patch.rect.min[0]..patch.rect.max[0] {
+            let pixel = (y * width + x) as usize;
+            let own = visibility.mirror_ids[pixel] == patch.triangle.0
+                && patch.cell.is_none_or(|c| c.contains(x, y));
+            let key = keys[pixel].load(Ordering::Relaxed);
+            if !own || key == EMPTY {
+                continue;
+            }
+            let surfel = u32::try_from(key & u64::from(u32::MAX)).unwrap_or(NONE);
+            let depth = u32::try_from(key >> 32).unwrap_or(NONE);
+            let object = scene.object_of_surfel(surfel);
+            let camera = pass.cameras[cameras.clone()].iter().find(|c| c.object as usize == object);
+            let Some(camera) = camera else { continue };
+            let work = Projection { pass, surfels: &scene.surfels, camera, patch, stride: 0 };
+            let q = scene.surfels.position(surfel as usize) - Vec3::from_array(camera.camera.v1);
+            let mut seen = Seen {
+                pixel,
+                surfel,
+                object: camera.object,
+                lambda: 0.0,
+                splat: [0.0; 2],
+                images: 0,
+            };
+            let [lo, hi] = camera.lambda;
+            project(&camera.camera, q.to_array(), lo, hi, |image| {
+                if image.linear(camera.front) <= 0.0 {
+                    return;
+                }
+                seen.images += u32::from(image.within([super::splat::EDGE_TOLERANCE; 3]));
+                // The batch's narrower λ range may have led Newton to a neighbour of this float.
+                let other = work.depth(&image);
+                let near = (other - f32::from_bits(depth)).abs() <= 1e-4 * other.abs();
+                if near && image.within(camera.guard) {
+                    let [x, y, _] = work.place(&image, 0.0);
+                    seen.lambda = image.lambda;
+                    seen.splat = [x + patch.rect.min[0] as f32, y + patch.rect.min[1] as f32];
+                }
+            });
+            list.push(seen);
+        }
+    }
+    list
+}

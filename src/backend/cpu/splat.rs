@@ -1,0 +1,301 @@
+//! The splat pass on the CPU: a patch is a task. Its tile of depth|surfel keys lies in the innermost cache; a
+//! key of 0 marks pixels of others, so that one comparison decides ownership and depth.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use fearless_simd::{Level, Simd, dispatch, f32x16};
+use rayon::prelude::*;
+
+use super::pool::Pool;
+use crate::camera::three_ray::{Image, project};
+use crate::geometry::Surfels;
+use crate::geometry::lanes::{Real, Vector, dot, simd_level};
+use crate::plan::{Batch, CameraInstance, DepthKey, SplatPass, SplatShape};
+use crate::visibility::{NONE_ID, Patch, Visibility};
+
+/// Nothing landed here.
+pub(crate) const EMPTY: u64 = u64::MAX;
+/// Not a pixel of the patch: nothing is nearer.
+const FOREIGN: u64 = 0;
+/// The paper counts an image as valid if no weight is below minus this (maths: tolerance over shared edges).
+pub(crate) const EDGE_TOLERANCE: f32 = 1e-3;
+/// Surfels projected at a time before they are splatted.
+const CHUNK: usize = 2048;
+/// One column and row around the tile takes what a 2 × 2 splat writes beyond it.
+const BORDER: u32 = 1;
+
+/// What the splat pass did, summed over threads.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SplatCounters {
+    /// Batches.
+    pub batches: u64,
+    /// Camera–surfel pairs projected.
+    pub projections: u64,
+    /// Pairs that have an image in the camera.
+    pub valid: u64,
+    /// Culling, thread nanoseconds.
+    pub cull_ns: u64,
+    /// Projection, thread nanoseconds.
+    pub project_ns: u64,
+    /// Splatting, thread nanoseconds.
+    pub splat_ns: u64,
+}
+
+impl SplatCounters {
+    fn plus(self, o: Self) -> Self {
+        Self {
+            batches: self.batches + o.batches,
+            projections: self.projections + o.projections,
+            valid: self.valid + o.valid,
+            cull_ns: self.cull_ns + o.cull_ns,
+            project_ns: self.project_ns + o.project_ns,
+            splat_ns: self.splat_ns + o.splat_ns,
+        }
+    }
+}
+
+/// Memory of one task, reused.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    batches: Vec<Batch>,
+    hits: Vec<Hit>,
+    tile: Vec<u64>,
+}
+
+/// A drawn image: its key and the tile slot of its splat's first pixel.
+#[derive(Clone, Copy)]
+struct Hit {
+    key: u64,
+    slot: u32,
+}
+
+/// Runs the pass: the nearest key of every pixel of `visibility` that is a mirror's goes into `keys`.
+pub(crate) fn splat(
+    pass: &SplatPass<'_>,
+    surfels: &Surfels,
+    visibility: &Visibility,
+    pool: &Pool<Scratch>,
+    keys: &[AtomicU64],
+) -> SplatCounters {
+    let level = simd_level();
+    let width = visibility.size.width;
+    (0..pass.patches.len())
+        .into_par_iter()
+        .map_init(
+            || pool.take(),
+            |scratch, index| splat_patch(pass, surfels, visibility, index, level, width, scratch, keys),
+        )
+        .reduce(SplatCounters::default, SplatCounters::plus)
+}
+
+#[expect(clippy::too_many_arguments, reason = "one private call")]
+fn splat_patch(
+    pass: &SplatPass<'_>,
+    surfels: &Surfels,
+    visibility: &Visibility,
+    index: usize,
+    level: Level,
+    width: u32,
+    scratch: &mut Scratch,
+    keys: &[AtomicU64],
+) -> SplatCounters {
+    let mut counters = SplatCounters::default();
+    let patch = &pass.patches[index];
+    let stride = patch.rect.width() + 2 * BORDER;
+    let Scratch { batches, hits, tile } = scratch;
+    fill_tile(tile, patch, visibility);
+    let cameras = pass.patch_cameras[index] as usize..pass.patch_cameras[index + 1] as usize;
+    for camera in &pass.cameras[cameras] {
+        let start = Instant::now();
+        batches.clear();
+        pass.batches.cull(camera, batches);
+        let mut last = Instant::now();
+        counters.cull_ns += nanoseconds(start, last);
+        counters.batches += batches.len() as u64;
+        let work = Projection { pass, surfels, camera, patch, stride };
+        let mut open = batches.as_slice();
+        while !open.is_empty() {
+            let taken = take_chunk(open);
+            hits.clear();
+            let (projections, valid) =
+                dispatch!(level, simd => work.run::<_, f32x16<_>>(simd, taken, hits));
+            let projected = Instant::now();
+            splat_hits(hits, pass.shape, stride as usize, tile);
+            let done = Instant::now();
+            counters.projections += projections;
+            counters.valid += valid;
+            counters.project_ns += nanoseconds(last, projected);
+            counters.splat_ns += nanoseconds(projected, done);
+            last = done;
+            open = &open[taken.len()..];
+        }
+    }
+    for y in 0..patch.rect.height() {
+        let row = ((y + BORDER) * stride + BORDER) as usize;
+        let to = ((patch.rect.min[1] + y) * width + patch.rect.min[0]) as usize;
+        let n = patch.rect.width() as usize;
+        for (key, out) in tile[row..row + n].iter().zip(&keys[to..to + n]) {
+            if *key != FOREIGN {
+                out.store(*key, Ordering::Relaxed);
+            }
+        }
+    }
+    counters
+}
+
+fn nanoseconds(from: Instant, to: Instant) -> u64 {
+    u64::try_from((to - from).as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// Batches whose surfels make up at most a chunk; at least one.
+fn take_chunk(open: &[Batch]) -> &[Batch] {
+    let mut sum = 0;
+    let fits = |b: &&Batch| {
+        sum += b.count as usize;
+        sum <= CHUNK
+    };
+    let n = open.iter().take_while(fits).count();
+    &open[..n.max(1)]
+}
+
+fn fill_tile(tile: &mut Vec<u64>, patch: &Patch, visibility: &Visibility) {
+    let stride = (patch.rect.width() + 2 * BORDER) as usize;
+    tile.clear();
+    tile.resize(stride * (patch.rect.height() + 2 * BORDER) as usize, FOREIGN);
+    for y in patch.rect.min[1]..patch.rect.max[1] {
+        let from = (y * visibility.size.width + patch.rect.min[0]) as usize;
+        let ids = &visibility.mirror_ids[from..from + patch.rect.width() as usize];
+        let at = (y - patch.rect.min[1] + BORDER) as usize * stride + BORDER as usize;
+        for (x, (key, &id)) in (patch.rect.min[0]..).zip(tile[at..].iter_mut().zip(ids)) {
+            debug_assert!(id != NONE_ID || patch.triangle.0 != NONE_ID);
+            let own = id == patch.triangle.0 && patch.cell.is_none_or(|c| c.contains(x, y));
+            *key = if own { EMPTY } else { FOREIGN };
+        }
+    }
+}
+
+fn splat_hits(hits: &[Hit], shape: SplatShape, stride: usize, tile: &mut [u64]) {
+    for hit in hits {
+        let slot = hit.slot as usize;
+        match shape {
+            SplatShape::Square1 => tile[slot] = tile[slot].min(hit.key),
+            SplatShape::Square2 => {
+                let block = &mut tile[slot..slot + stride + 2];
+                for i in [0, 1, stride, stride + 1] {
+                    block[i] = block[i].min(hit.key);
+                }
+            }
+        }
+    }
+}
+
+/// The projection of batches by one camera.
+pub(crate) struct Projection<'a> {
+    pub(crate) pass: &'a SplatPass<'a>,
+    pub(crate) surfels: &'a Surfels,
+    pub(crate) camera: &'a CameraInstance,
+    pub(crate) patch: &'a Patch,
+    pub(crate) stride: u32,
+}
+
+impl Projection<'_> {
+    /// Projects the batches; appends what lands in the tile; returns the pairs projected and those with an image.
+    #[inline(always)]
+    fn run<S: Simd, V: Vector<S>>(
+        &self,
+        simd: S,
+        batches: &[Batch],
+        hits: &mut Vec<Hit>,
+    ) -> (u64, u64) {
+        let (mut projections, mut valid) = (0, 0);
+        let offset = match self.pass.shape {
+            SplatShape::Square1 => BORDER as f32,
+            SplatShape::Square2 => BORDER as f32 - 0.5,
+        };
+        let zero = V::broadcast(simd, 0.0);
+        let width = V::broadcast(simd, (self.stride - BORDER) as f32);
+        let height = V::broadcast(simd, (self.patch.rect.height() + BORDER) as f32);
+        let (mut xs, mut ys, mut depths) = ([0.0; 16], [0.0; 16], [0.0; 16]);
+        for batch in batches {
+            let [lo, hi] = batch.lambda.map(|l| V::broadcast(simd, l));
+            let end = batch.first + batch.count;
+            let mut at = batch.first;
+            projections += u64::from(batch.count);
+            while at < end {
+                let i = at as usize;
+                let lanes = (end - at).min(V::LANES as u32);
+                let active = V::mask(simd, (1u64 << lanes) - 1);
+                let v1 = &self.camera.camera.v1;
+                let q = [
+                    V::load(simd, &self.surfels.x[i..]) - v1[0],
+                    V::load(simd, &self.surfels.y[i..]) - v1[1],
+                    V::load(simd, &self.surfels.z[i..]) - v1[2],
+                ];
+                let mut seen = 0u64;
+                let mut taken = !active;
+                project(&self.camera.camera, q, lo, hi, |image| {
+                    let front = zero.lt(image.linear(self.camera.front)) & active;
+                    let inside = image.within([EDGE_TOLERANCE; 3]) & front;
+                    seen |= V::bits(inside);
+                    let mut drawn = image.within(self.camera.guard) & front;
+                    if self.pass.first_root_only {
+                        drawn = drawn & !taken;
+                        taken = taken | drawn;
+                    }
+                    if !V::any(drawn) {
+                        return;
+                    }
+                    let [x, y, lands] = self.place(&image, offset);
+                    let lands = zero.lt(lands) & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
+                    let mut bits = V::bits(drawn & lands);
+                    if bits == 0 {
+                        return;
+                    }
+                    x.store(&mut xs);
+                    y.store(&mut ys);
+                    self.depth(&image).store(&mut depths);
+                    while bits != 0 {
+                        let lane = bits.trailing_zeros();
+                        bits &= bits - 1;
+                        let l = lane as usize;
+                        // Not negative and less than the tile's size: the cast truncates, which is floor here.
+                        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "see above")]
+                        let slot = ys[l] as u32 * self.stride + xs[l] as u32;
+                        let key = u64::from(depths[l].to_bits()) << 32 | u64::from(at + lane);
+                        hits.push(Hit { key, slot });
+                    }
+                });
+                valid += u64::from(seen.count_ones());
+                at += lanes;
+            }
+        }
+        (projections, valid)
+    }
+
+    /// Position in the tile, in pixels plus `offset`, and the homogeneous w.
+    #[inline(always)]
+    pub(crate) fn place<R: Real<Scalar = f32>>(&self, image: &Image<R>, offset: f32) -> [R; 3] {
+        let w = image.linear(self.camera.screen[2]);
+        let usable = w.splat(0.0).lt(w);
+        let inverse = w.splat(1.0) / R::select(usable, w, w.splat(1.0));
+        let x = image.linear(self.camera.screen[0]) * inverse + offset;
+        let y = image.linear(self.camera.screen[1]) * inverse + offset;
+        [x, y, w]
+    }
+
+    /// The depth key: not negative.
+    #[inline(always)]
+    pub(crate) fn depth<R: Real<Scalar = f32>>(&self, image: &Image<R>) -> R {
+        let camera = &self.camera.camera;
+        let d = [0, 1, 2].map(|k| {
+            image.b2 * camera.f1[k] + image.b3 * camera.f2[k] + camera.d1[k]
+        });
+        let mut depth = image.lambda * dot(d, d).sqrt();
+        if self.pass.depth == DepthKey::PushBack {
+            let v = self.camera.from_eye.map(|form| image.linear(form));
+            depth = depth + dot(v, v).sqrt();
+        }
+        (depth * self.camera.scale).max(image.lambda.splat(0.0))
+    }
+}

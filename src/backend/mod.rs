@@ -1,0 +1,56 @@
+//! Backends execute plans. They know passes, not methods.
+
+pub mod cpu;
+
+use crate::error::Result;
+use crate::plan::{Plan, Reflection};
+use crate::scene::prepared::PreparedScene;
+use crate::visibility::Visibility;
+
+/// What executing a plan did and took. A stage that was not timed apart is `None`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ExecuteReport {
+    /// Cameras of the splat passes.
+    pub cameras: usize,
+    /// Visible patches of the splat passes.
+    pub patches: usize,
+    /// Batches of surfels.
+    pub batches: u64,
+    /// Camera–surfel pairs projected.
+    pub projections: u64,
+    /// Pairs that have an image in the camera.
+    pub valid: u64,
+    /// Culling, milliseconds of all threads together by their number.
+    pub cull_ms: Option<f64>,
+    /// Projection, likewise.
+    pub project_ms: Option<f64>,
+    /// Splatting, likewise.
+    pub splat_ms: Option<f64>,
+    /// Wall time of clear, splat and resolve passes, milliseconds.
+    pub passes_ms: Option<f64>,
+    /// Wall time of tracing reflected rays, milliseconds.
+    pub rays_ms: Option<f64>,
+}
+
+/// Something that executes plans. It keeps its memory between frames.
+pub trait Backend: Send {
+    /// Short name, as after `--backend`.
+    fn id(&self) -> &'static str;
+
+    /// Executes `plan`; `out` becomes the reflection of every mirror pixel. With `planes` it also says what was
+    /// seen, which is not timed.
+    ///
+    /// # Errors
+    /// The device failed.
+    ///
+    /// # Panics
+    /// If a pass reads what no pass before it wrote.
+    fn execute(
+        &mut self,
+        plan: &Plan<'_>,
+        scene: &PreparedScene,
+        visibility: &Visibility,
+        planes: bool,
+        out: &mut Reflection,
+    ) -> Result<ExecuteReport>;
+}

@@ -1,0 +1,244 @@
+//! Which boxes meet a view volume: several tests, written once over lanes (a lane is a box).
+//!
+//! All but [`BoxTest::Paper`] are conservative: a box that contains a point with an image is never refused.
+//! Rounding goes outward by [`ROUNDING`].
+
+use glam::DVec3;
+
+use super::{Rays, array};
+use crate::geometry::lanes::{Real, Scalar, cross, dot_const};
+
+/// How boxes are tested against a view volume.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BoxTest {
+    /// Not at all: whole objects.
+    None,
+    /// Sweep separation along x, y, z.
+    Interval,
+    /// Sweep separation along x, y, z, the camera's axis and its three walls.
+    Sweep,
+    /// λ from the camera's axis, then the hull of T(λlo) and T(λhi): its box and three walls fitted to it.
+    #[default]
+    Slab,
+    /// The two conditions of Mei et al. section 5.2, which miss boxes; for comparison only.
+    Paper,
+}
+
+/// Boxes by middle and half edge lengths, one a lane, in the camera's space.
+#[derive(Clone, Copy, Debug)]
+pub struct Boxes<R> {
+    /// Middles.
+    pub center: [R; 3],
+    /// Half edge lengths, rounded up.
+    pub half: [R; 3],
+}
+
+/// A fixed direction along which the sweep is compared with boxes.
+#[derive(Clone, Copy, Debug)]
+struct Direction<T> {
+    n: [T; 3],
+    /// n·(v_i - v1).
+    start: [T; 3],
+    /// n·d_i.
+    speed: [T; 3],
+    /// 1 / speed where that is not zero.
+    per_speed: [T; 3],
+    /// Largest |start|.
+    reach: T,
+}
+
+/// A view volume: the union of T(λ) over a λ range.
+#[derive(Clone, Copy, Debug)]
+pub struct ViewVolume<T> {
+    v1: [T; 3],
+    v: [[T; 3]; 3],
+    d: [[T; 3]; 3],
+    axes: [Direction<T>; 3],
+    axis: Direction<T>,
+    walls: [Direction<T>; 3],
+}
+
+/// Margin for the rounding of an inequality, as a share of its largest term: eight roundings of f32.
+const ROUNDING: f64 = 1e-6;
+/// Where the fixed walls of the sweep test touch the volume, as λ (untuned).
+const WALL_LAMBDA: f64 = 1.0;
+
+impl<T: Scalar> Direction<T> {
+    fn new(n: DVec3, rays: &Rays) -> Self {
+        // The rounded direction is the one that is compared with, so its products are made from it.
+        let n: [T; 3] = array(n);
+        let exact = DVec3::from_array(n.map(T::to_f64));
+        let start = rays.origins.map(|v| exact.dot(v - rays.origins[0]));
+        let speed = rays.directions.map(|d| exact.dot(d));
+        let reach = start.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
+        Self {
+            n,
+            start: start.map(T::from_f64),
+            speed: speed.map(T::from_f64),
+            per_speed: speed.map(|s| T::from_f64(if s == 0.0 { 0.0 } else { 1.0 / s })),
+            reach: T::from_f64(reach),
+        }
+    }
+
+    /// Takes from `lo..hi` the λ at an end of it at which all of T(λ) lies beyond the box along ±n.
+    #[inline(always)]
+    fn trim<R: Real<Scalar = T>>(&self, boxes: &Boxes<R>, lo: R, hi: R) -> (R, R) {
+        let zero = T::from_f64(0.0);
+        let share = T::from_f64(ROUNDING);
+        let [nx, ny, nz] = self.n;
+        let middle = dot_const(boxes.center, self.n);
+        let half = boxes.half[0] * abs(nx) + boxes.half[1] * abs(ny) + boxes.half[2] * abs(nz);
+        let sizes = boxes.center[0].abs() * abs(nx)
+            + boxes.center[1].abs() * abs(ny)
+            + boxes.center[2].abs() * abs(nz);
+        let half = half + (sizes + half + self.reach) * share;
+        let far = lo.splat(T::from_f64(f64::from(f32::MAX)));
+        let (mut lo, mut hi) = (lo, hi);
+        for above in [true, false] {
+            // T(λ) is beyond the box where ±(start_i + λ speed_i) > ±edge for all i: an interval of λ.
+            let edge = if above { middle + half } else { middle - half };
+            let (mut from, mut to) = (-far, far);
+            for i in 0..3 {
+                let speed = if above { self.speed[i] } else { -self.speed[i] };
+                let at = (edge - self.start[i]) * self.per_speed[i];
+                if speed > zero {
+                    from = from.max(at + at.abs() * share);
+                } else if speed < zero {
+                    to = to.min(at - at.abs() * share);
+                } else {
+                    let gap = if above { -edge + self.start[i] } else { edge - self.start[i] };
+                    from = R::select(lo.splat(zero).lt(gap), from, far);
+                }
+            }
+            let (at_start, at_end) = (from.lt(lo), hi.lt(to));
+            let (next_lo, next_hi) = (lo.max(to), hi.min(from));
+            // An interval that covers both ends leaves nothing: lo > hi.
+            let open = from.lt(to);
+            lo = R::select(at_start & open, next_lo, lo);
+            hi = R::select(at_end & open, next_hi, hi);
+        }
+        (lo, hi)
+    }
+}
+
+#[inline(always)]
+fn abs<T: Scalar>(x: T) -> T {
+    if x < T::from_f64(0.0) { -x } else { x }
+}
+
+impl<T: Scalar> ViewVolume<T> {
+    /// The volume of the grown camera `rays`. Boxes are given relative to [`ViewVolume::origin`].
+    pub fn new(rays: &Rays) -> Self {
+        let v1 = rays.origins[0];
+        let axis = rays.axis().unwrap_or(DVec3::ZERO);
+        let wall = |i: usize, j: usize| {
+            let at = |k: usize| rays.origins[k] + rays.directions[k] * WALL_LAMBDA;
+            let n = (at(j) - at(i)).cross(rays.directions[i] + rays.directions[j]);
+            n.try_normalize().unwrap_or(DVec3::ZERO)
+        };
+        Self {
+            v1: array(v1),
+            v: rays.origins.map(|v| array(v - v1)),
+            d: rays.directions.map(array),
+            axes: [DVec3::X, DVec3::Y, DVec3::Z].map(|n| Direction::new(n, rays)),
+            axis: Direction::new(axis, rays),
+            walls: [(0, 1), (1, 2), (2, 0)].map(|(i, j)| Direction::new(wall(i, j), rays)),
+        }
+    }
+
+    /// The camera's first origin; box middles are given relative to it.
+    pub fn origin(&self) -> [T; 3] {
+        self.v1
+    }
+
+    /// The part of λ `lo..=hi` that is left for boxes that may meet the volume, and the lanes where some is.
+    #[inline(always)]
+    pub fn meets<R: Real<Scalar = T>>(
+        &self,
+        test: BoxTest,
+        boxes: &Boxes<R>,
+        lo: R,
+        hi: R,
+    ) -> (R, R, R::Mask) {
+        match test {
+            BoxTest::None => (lo, hi, lo.le(hi)),
+            BoxTest::Interval => self.sweep(boxes, lo, hi, false),
+            BoxTest::Sweep => self.sweep(boxes, lo, hi, true),
+            BoxTest::Slab => self.slab(boxes, lo, hi),
+            BoxTest::Paper => super::paper_test::meets(&self.v, &self.d, boxes, lo, hi),
+        }
+    }
+
+    #[inline(always)]
+    fn sweep<R: Real<Scalar = T>>(
+        &self,
+        boxes: &Boxes<R>,
+        lo: R,
+        hi: R,
+        walls: bool,
+    ) -> (R, R, R::Mask) {
+        let (mut lo, mut hi) = (lo, hi);
+        if walls {
+            (lo, hi) = self.axis.trim(boxes, lo, hi);
+        }
+        for direction in &self.axes {
+            (lo, hi) = direction.trim(boxes, lo, hi);
+        }
+        if walls && R::any(lo.le(hi)) {
+            for direction in &self.walls {
+                (lo, hi) = direction.trim(boxes, lo, hi);
+            }
+        }
+        (lo, hi, lo.le(hi))
+    }
+
+    #[inline(always)]
+    fn slab<R: Real<Scalar = T>>(&self, boxes: &Boxes<R>, lo: R, hi: R) -> (R, R, R::Mask) {
+        let (lo, hi) = self.axis.trim(boxes, lo, hi);
+        let share = T::from_f64(ROUNDING);
+        let mut alive = lo.le(hi);
+        let at = |k: usize, i: usize, lambda: R| lambda * self.d[i][k] + self.v[i][k];
+        let near: [[R; 3]; 3] = [0, 1, 2].map(|i| [0, 1, 2].map(|k| at(k, i, lo)));
+        let far: [[R; 3]; 3] = [0, 1, 2].map(|i| [0, 1, 2].map(|k| at(k, i, hi)));
+        let mut size = lo.splat(T::from_f64(0.0));
+        for k in 0..3 {
+            let low = [near[1][k], near[2][k], far[0][k], far[1][k], far[2][k]]
+                .into_iter()
+                .fold(near[0][k], R::min);
+            let high = [near[1][k], near[2][k], far[0][k], far[1][k], far[2][k]]
+                .into_iter()
+                .fold(near[0][k], R::max);
+            let (c, h) = (boxes.center[k], boxes.half[k]);
+            let margin = (c.abs() + h + low.abs().max(high.abs())) * share;
+            size = size + margin;
+            alive = alive & (c - h).le(high + margin) & low.le(c + h + margin);
+        }
+        if !R::any(alive) {
+            return (lo, hi, alive);
+        }
+        let mid = (lo + hi) * T::from_f64(0.5);
+        for (i, j, other) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+            let edge = [0, 1, 2].map(|k| at(k, j, mid) - at(k, i, mid));
+            let along = [0, 1, 2].map(|k| mid.splat(self.d[i][k] + self.d[j][k]));
+            let n = cross(edge, along);
+            let reach = |p: &[R; 3]| p[0] * n[0] + p[1] * n[1] + p[2] * n[2];
+            let on_edge =
+                reach(&near[i]).max(reach(&far[i])).max(reach(&near[j]).max(reach(&far[j])));
+            let low_edge =
+                reach(&near[i]).min(reach(&far[i])).min(reach(&near[j]).min(reach(&far[j])));
+            let (r_near, r_far) = (reach(&near[other]), reach(&far[other]));
+            let high = on_edge.max(r_near.max(r_far));
+            let low = low_edge.min(r_near.min(r_far));
+            let sizes = [n[0].abs(), n[1].abs(), n[2].abs()];
+            let half =
+                boxes.half[0] * sizes[0] + boxes.half[1] * sizes[1] + boxes.half[2] * sizes[2];
+            // Every term is at most `size / share` times the normal's largest component.
+            let margin = size * (sizes[0] + sizes[1] + sizes[2]) * T::from_f64(4.0);
+            let middle = reach(&boxes.center);
+            // Refused only where the comparison holds: a NaN from an overflow refuses nothing.
+            let outside = (high + margin).lt(middle - half) | (middle + half).lt(low - margin);
+            alive = alive & !outside;
+        }
+        (lo, hi, alive)
+    }
+}

@@ -1,0 +1,259 @@
+//! The command line: one thin file a verb. It parses, calls the library and writes.
+
+pub mod bench;
+pub mod compare;
+pub mod info;
+pub mod render;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context as _;
+use catoptric::accel::KdTreeLimits;
+use catoptric::camera::Eye;
+use catoptric::camera::eye::ImageSize;
+use catoptric::image::io::write_bytes;
+use catoptric::methods::{METHODS, Method, MethodInfo, Params, method};
+use catoptric::scene::arrange::{self, Request};
+use catoptric::scene::prepared::{DEFAULT_SURFELS, PrepareOptions, PreparedScene};
+use catoptric::{Context, Error, Result};
+use clap::{Arg, ArgMatches, Args, Command};
+use glam::DVec3;
+use serde_json::{Value, json};
+
+/// Largest picture side: what the rasteriser's coordinates hold.
+const MAX_SIDE: u32 = 16_384;
+
+/// What to render and how to look at it.
+#[derive(Args, Debug)]
+pub(crate) struct SceneArgs {
+    /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply) to be set beside the teapot
+    #[arg(value_name = "SCENE|MODEL")]
+    inputs: Vec<String>,
+    /// Mirror: a mesh file, used as placed, or a built-in shape; repeatable
+    #[arg(long, value_name = "FILE|NAME")]
+    mirror: Vec<String>,
+    /// Object: a mesh file, used as placed, or a built-in shape; repeatable
+    #[arg(long, value_name = "FILE|NAME")]
+    object: Vec<String>,
+    /// Surfels over all objects
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_SURFELS)]
+    surfels: usize,
+    /// Surfels a tree leaf holds at most (default 16; 122 with --preset paper)
+    #[arg(long, value_name = "N")]
+    leaf: Option<u32>,
+    /// Tree nodes of at most this share of their object's size are leaves
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    leaf_size: f32,
+    /// Seed of the sampling
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Eye position, world space
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    eye: Option<DVec3>,
+    /// What the eye looks at, world space
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    target: Option<DVec3>,
+    /// Vertical field of view in degrees
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
+    fov: Option<f64>,
+    /// Picture size in pixels
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    size: ImageSize,
+    /// Threads (default: all cores)
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+}
+
+fn point(text: &str) -> Result<DVec3, String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, z] if numbers.iter().all(|n| n.is_finite()) && text.split(',').count() == 3 => {
+            Ok(DVec3::new(x, y, z))
+        }
+        _ => Err("give three numbers with commas between, such as 0,0.5,-2".into()),
+    }
+}
+
+fn size(text: &str) -> Result<ImageSize, String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    match sides {
+        Some((width, height)) if (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height) => {
+            Ok(ImageSize { width, height })
+        }
+        Some(_) => Err(format!("each side must be from 1 to {MAX_SIDE} pixels")),
+        None => Err("give width x height in pixels, such as 1280x720".into()),
+    }
+}
+
+/// A scene that is ready, the eye, and how long loading took.
+pub(crate) struct Ready {
+    pub(crate) scene: PreparedScene,
+    pub(crate) eye: Eye,
+    pub(crate) load_ms: f64,
+}
+
+impl SceneArgs {
+    /// The scene without a command line: the built-in one.
+    pub(crate) fn default_scene() -> Self {
+        Self {
+            inputs: Vec::new(),
+            mirror: Vec::new(),
+            object: Vec::new(),
+            surfels: DEFAULT_SURFELS,
+            leaf: None,
+            leaf_size: 0.0,
+            seed: 1,
+            eye: None,
+            target: None,
+            fov: None,
+            size: ImageSize { width: 1280, height: 720 },
+            threads: None,
+        }
+    }
+
+    /// Sets the number of threads for everything that follows.
+    fn start_threads(&self) -> anyhow::Result<()> {
+        if let Some(n) = self.threads {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(n)
+                .build_global()
+                .context("--threads: the threads could not be started")?;
+        }
+        Ok(())
+    }
+
+    /// Loads and prepares. `leaf` is a preset's leaf size.
+    pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
+        self.start_threads()?;
+        let start = Instant::now();
+        let request = Request {
+            inputs: self.inputs.clone(),
+            mirrors: self.mirror.clone(),
+            objects: self.object.clone(),
+            eye: self.eye,
+            target: self.target,
+            fov_y_deg: self.fov,
+        };
+        let scene = arrange::scene(&request, cx)?;
+        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        let standard = KdTreeLimits::default();
+        let options = PrepareOptions {
+            surfels: self.surfels,
+            tree: KdTreeLimits {
+                leaf_points: self.leaf.or(leaf).unwrap_or(standard.leaf_points),
+                leaf_size: self.leaf_size,
+            },
+            seed: self.seed,
+        };
+        let scene = PreparedScene::new(&scene, &options, cx)?;
+        let eye = eye_of(&scene, self.size)?;
+        Ok(Ready { scene, eye, load_ms })
+    }
+}
+
+/// The scene's own eye for a picture size.
+fn eye_of(scene: &PreparedScene, size: ImageSize) -> Result<Eye> {
+    let e = scene.eye;
+    let (position, target) = (e.position - scene.origin, e.target - scene.origin);
+    Eye::new(position, target, e.up, e.fov_y, size).ok_or_else(|| {
+        Error::input(
+            "--eye, --target, --fov",
+            "",
+            "they do not make a view",
+            "let the eye differ from the target, not look along its up vector, and take 0 < fov < 180",
+        )
+    })
+}
+
+/// Adds the flags of all methods' parameters to a command.
+pub(crate) fn with_method_flags(mut command: Command) -> Command {
+    let mut seen: Vec<&str> = Vec::new();
+    for m in METHODS {
+        for p in m.info().params {
+            if seen.contains(&p.id) {
+                continue;
+            }
+            seen.push(p.id);
+            let users: Vec<&str> = METHODS
+                .iter()
+                .filter(|m| m.info().params.iter().any(|q| q.id == p.id))
+                .map(|m| m.info().id)
+                .collect();
+            let unit = if p.unit.is_empty() { String::new() } else { format!(", {}", p.unit) };
+            let help = format!("{}{unit} [{}; {}]", p.about, p.takes(), users.join(", "));
+            command = command.arg(
+                Arg::new(p.id).long(p.id).value_name(p.value_name()).help(help).help_heading("Method parameters"),
+            );
+        }
+    }
+    command
+}
+
+/// The method of that name with the parameters that the flags give it.
+pub(crate) fn chosen_method(
+    id: &str,
+    preset: Option<&str>,
+    matches: &ArgMatches,
+) -> Result<(&'static dyn Method, Params, Option<u32>)> {
+    let ids: Vec<&str> = METHODS.iter().map(|m| m.info().id).collect();
+    let chosen = method(id).ok_or_else(|| {
+        Error::input("--method", "", format!("there is no method \"{id}\""), format!("use one of {}", ids.join(", ")))
+    })?;
+    let info = chosen.info();
+    let mut params = Params::defaults(info.params);
+    let mut leaf = None;
+    if let Some(name) = preset {
+        let preset = info.presets.iter().find(|p| p.id == name).ok_or_else(|| {
+            let names: Vec<&str> = info.presets.iter().map(|p| p.id).collect();
+            let remedy = if names.is_empty() { "leave it out".into() } else { format!("use {}", names.join(", ")) };
+            Error::input("--preset", "", format!("{id} has no preset \"{name}\""), remedy)
+        })?;
+        leaf = preset.leaf_points;
+        for (param, value) in preset.params {
+            params.set(info.param(param), value)?;
+        }
+    }
+    apply_flags(info, matches, &mut params)?;
+    Ok((chosen, params, leaf))
+}
+
+fn apply_flags(info: &MethodInfo, matches: &ArgMatches, params: &mut Params) -> Result<()> {
+    for m in METHODS {
+        for p in m.info().params {
+            let Ok(Some(text)) = matches.try_get_one::<String>(p.id) else { continue };
+            match info.params.iter().find(|own| own.id == p.id) {
+                Some(own) => params.set(own, text)?,
+                None => {
+                    return Err(Error::input(
+                        format!("--{}", p.id),
+                        "",
+                        format!("{} has no such parameter", info.id),
+                        format!("leave it out or use --method {}", m.info().id),
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Writes the figures where `--json` says.
+pub(crate) fn write_json(path: Option<&PathBuf>, value: &Value) -> anyhow::Result<()> {
+    if let Some(path) = path {
+        let mut text = serde_json::to_string_pretty(value)?;
+        text.push('\n');
+        write_bytes(path, text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// A number rounded to what a timer can tell, or null.
+pub(crate) fn ms(value: Option<f64>) -> Value {
+    value.map_or(Value::Null, |v| json!((v * 1e3).round() / 1e3))
+}
+
+/// Refuses an output that cannot be written before any work is done.
+pub(crate) fn check_json(path: Option<&PathBuf>) -> Result<()> {
+    path.map_or(Ok(()), |p: &PathBuf| catoptric::image::io::check_folder(p as &Path))
+}

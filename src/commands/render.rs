@@ -1,0 +1,170 @@
+//! `catoptric render`: a scene to a picture.
+
+use std::path::{Path, PathBuf};
+
+use catoptric::frame::{FrameReport, Renderer};
+use catoptric::image::aov::write_aov;
+use catoptric::image::io::{check_output, write_picture};
+use catoptric::methods::METHODS;
+use catoptric::{Context, Error};
+use clap::{ArgMatches, Args};
+use serde_json::{Value, json};
+
+use super::{Ready, SceneArgs, check_json, chosen_method, ms, write_json};
+
+/// Render a scene to a picture
+#[derive(Args, Debug)]
+pub(crate) struct RenderArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) how: HowArgs,
+    /// Picture to write: .png (8-bit sRGB), .exr or .hdr (linear)
+    #[arg(short, long, value_name = "FILE", default_value = "catoptric.png")]
+    pub(crate) output: PathBuf,
+    /// Also write what every mirror pixel shows, as a multi-layer EXR
+    #[arg(long, value_name = "FILE.exr")]
+    pub(crate) aov: Option<PathBuf>,
+    /// Write the figures as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Render so often and report medians
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(crate) repeat: u32,
+}
+
+/// Method and backend.
+#[derive(Args, Debug)]
+pub(crate) struct HowArgs {
+    /// Reflection method: c3rc or raytrace
+    #[arg(long, value_name = "ID", default_value = "c3rc")]
+    pub(crate) method: String,
+    /// Where it runs: auto (whatever is fastest here) or cpu
+    #[arg(long, value_name = "ID", default_value = "auto", value_parser = ["auto", "cpu"])]
+    pub(crate) backend: String,
+    /// Named set of parameters (paper: everything as Mei et al. had it)
+    #[arg(long, value_name = "NAME")]
+    pub(crate) preset: Option<String>,
+}
+
+pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyhow::Result<()> {
+    check_output(&args.output)?;
+    if let Some(path) = &args.aov {
+        check_aov(path)?;
+    }
+    check_json(args.json.as_ref())?;
+    let (method, params, leaf) =
+        chosen_method(&args.how.method, args.how.preset.as_deref(), matches)?;
+    let ready = args.scene.ready(leaf, cx)?;
+    let mut renderer = Renderer::new();
+    let mut reports = Vec::new();
+    for i in 0..args.repeat {
+        if args.repeat > 1 {
+            cx.step("rendering", f64::from(i) / f64::from(args.repeat))?;
+        }
+        // The planes come with the last frame, and cost the timed ones nothing.
+        let planes = args.aov.is_some() && i + 1 == args.repeat;
+        reports.push(renderer.render(&ready.scene, &ready.eye, method, &params, planes, cx)?);
+    }
+    let report = FrameReport::median(&reports);
+    cx.step("writing", 1.0)?;
+    write_picture(&args.output, renderer.picture())?;
+    if let (Some(path), Some(planes)) = (&args.aov, renderer.planes()) {
+        let names: Vec<String> = ready.scene.objects.iter().map(|o| o.name.clone()).collect();
+        write_aov(path, planes, &names)?;
+    }
+    write_json(args.json.as_ref(), &figures(&ready, &report))?;
+    print(&args.output, &ready, &report);
+    Ok(())
+}
+
+fn check_aov(path: &Path) -> Result<(), Error> {
+    let exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    if !exr {
+        return Err(Error::file(path, "", "AOVs are written as EXR only", "give a name that ends in .exr"));
+    }
+    check_output(path)
+}
+
+/// The keys that the README documents. A stage that was not timed apart is null.
+pub(crate) fn figures(ready: &Ready, report: &FrameReport) -> Value {
+    let scene = &ready.scene;
+    let size = ready.eye.size;
+    json!({
+        "scene": scene.name,
+        "method": report.method,
+        "backend": report.backend,
+        "size": [size.width, size.height],
+        "surfels": scene.surfels.len(),
+        "mirror_triangles": scene.mirror_triangle_count(),
+        "cameras": report.cameras,
+        "batches": report.batches,
+        "projections": report.projections,
+        "valid": report.valid,
+        "valid_share": report.valid_share(),
+        "mirror_pixels": report.mirror_pixels,
+        "covered_pixels": report.covered_pixels,
+        "threads": rayon::current_num_threads(),
+        "ms": {
+            "load": ms(Some(ready.load_ms)),
+            "sample": ms(Some(scene.times.sample_ms)),
+            "tree": ms(Some(scene.times.tree_ms)),
+            "shade": ms(Some(scene.times.shade_ms)),
+            "ids": ms(report.ids_ms),
+            "cameras": ms(report.cameras_ms),
+            "cull": ms(report.cull_ms),
+            "project": ms(report.project_ms),
+            "splat": ms(report.splat_ms),
+            "layer": ms(report.layer_ms),
+            "rays": ms(report.rays_ms),
+            "composite": ms(report.composite_ms),
+            "frame": ms(report.frame_ms),
+        },
+    })
+}
+
+fn print(output: &Path, ready: &Ready, report: &FrameReport) {
+    let size = ready.eye.size;
+    println!(
+        "{}: {} x {}, {} by {} on {}",
+        output.display(),
+        size.width,
+        size.height,
+        ready.scene.name,
+        report.method,
+        report.backend
+    );
+    println!(
+        "  {} surfels, {} mirror triangles, {} mirror pixels",
+        ready.scene.surfels.len(),
+        ready.scene.mirror_triangle_count(),
+        report.mirror_pixels
+    );
+    if let Some(share) = report.valid_share() {
+        println!(
+            "  {} cameras, {} batches, {} projections, {:.1} % valid",
+            report.cameras,
+            report.batches,
+            report.projections,
+            share * 100.0
+        );
+    }
+    let stages = [
+        ("visibility", report.ids_ms),
+        ("cameras", report.cameras_ms),
+        ("culling", report.cull_ms),
+        ("projection", report.project_ms),
+        ("splatting", report.splat_ms),
+        ("reflected layer", report.layer_ms),
+        ("reflected rays", report.rays_ms),
+        ("composite", report.composite_ms),
+        ("frame", report.frame_ms),
+    ];
+    let timed = stages.iter().filter_map(|(name, ms)| ms.map(|ms| format!("{name} {ms:.1}")));
+    println!("  ms: {}", timed.collect::<Vec<_>>().join(", "));
+}
+
+/// The ids of all methods, for messages.
+pub(crate) fn method_ids() -> String {
+    METHODS.iter().map(|m| m.info().id).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,147 @@
+//! Culling: which surfels a camera has to project (Mei et al. section 5.2, with conservative tests).
+
+use fearless_simd::{Level, Simd, dispatch, f32x8};
+
+use crate::accel::kd_tree::{CHILDREN, WideNode};
+use crate::camera::three_ray::{BoxTest, Boxes, ViewVolume};
+use crate::geometry::lanes::{Vector, simd_level};
+use crate::plan::{Batch, BatchSource, CameraInstance};
+use crate::scene::prepared::PreparedScene;
+
+/// Walks the objects' trees with one box test.
+pub struct Culler<'a> {
+    scene: &'a PreparedScene,
+    test: BoxTest,
+    level: Level,
+}
+
+impl<'a> Culler<'a> {
+    /// Culls against `scene` with `test`.
+    pub fn new(scene: &'a PreparedScene, test: BoxTest) -> Self {
+        Self { scene, test, level: simd_level() }
+    }
+}
+
+impl BatchSource for Culler<'_> {
+    fn cull(&self, camera: &CameraInstance, out: &mut Vec<Batch>) {
+        let object = &self.scene.objects[camera.object as usize];
+        let walk = Walk {
+            wide: object.tree.wide(),
+            volume: &camera.volume,
+            test: self.test,
+            lambda: camera.lambda,
+            first: object.surfels.start,
+        };
+        let from = out.len();
+        if self.test == BoxTest::None {
+            out.push(Batch {
+                first: object.surfels.start,
+                count: object.surfels.end - object.surfels.start,
+                lambda: camera.lambda,
+                roots: 1,
+            });
+        } else {
+            dispatch!(self.level, simd => walk.run(simd, out));
+        }
+        for batch in &mut out[from..] {
+            let [lo, hi] = camera.several;
+            let meets = batch.lambda[0] <= hi && lo <= batch.lambda[1] && lo <= hi;
+            batch.roots = if meets { 3 } else { 1 };
+        }
+    }
+}
+
+struct Walk<'a> {
+    wide: &'a [WideNode],
+    volume: &'a ViewVolume<f32>,
+    test: BoxTest,
+    lambda: [f32; 2],
+    first: u32,
+}
+
+/// A subtree or leaf that may meet the volume.
+#[derive(Clone, Copy, Default)]
+struct Open {
+    child: u32,
+    first: u32,
+    count: u32,
+    lambda: [f32; 2],
+}
+
+/// A wide level at least halves the surfels, and each leaves at most seven siblings open.
+const STACK: usize = 32 * (CHILDREN - 1) + 1;
+
+impl Walk<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&self, simd: S, out: &mut Vec<Batch>) {
+        let mut stack = [Open::default(); STACK];
+        let mut top = 0;
+        let mut node = &self.wide[0];
+        let mut lambda = self.lambda;
+        let from = out.len();
+        loop {
+            let (lo, hi, mut bits) = test_children(simd, node, self.volume, self.test, lambda);
+            bits &= node.used;
+            // The last child first, so that leaves come out in surfel order.
+            while bits != 0 {
+                let slot = 63 - bits.leading_zeros() as usize;
+                bits ^= 1 << slot;
+                stack[top] = Open {
+                    child: node.child[slot],
+                    first: self.first + node.first[slot],
+                    count: node.count[slot],
+                    lambda: [lo[slot], hi[slot]],
+                };
+                top += 1;
+            }
+            loop {
+                if top == 0 {
+                    return;
+                }
+                top -= 1;
+                let open = stack[top];
+                if open.child != 0 {
+                    node = &self.wide[open.child as usize];
+                    lambda = open.lambda;
+                    break;
+                }
+                match out[from..].last_mut() {
+                    Some(last) if last.first + last.count == open.first => {
+                        last.count += open.count;
+                        last.lambda[0] = last.lambda[0].min(open.lambda[0]);
+                        last.lambda[1] = last.lambda[1].max(open.lambda[1]);
+                    }
+                    _ => out.push(Batch {
+                        first: open.first,
+                        count: open.count,
+                        lambda: open.lambda,
+                        roots: 3,
+                    }),
+                }
+            }
+        }
+    }
+}
+
+/// Tests the eight boxes of a node: what is left of the λ range for each, and bit i where box i may meet.
+#[inline(always)]
+pub(crate) fn test_children<S: Simd>(
+    simd: S,
+    node: &WideNode,
+    volume: &ViewVolume<f32>,
+    test: BoxTest,
+    lambda: [f32; 2],
+) -> ([f32; CHILDREN], [f32; CHILDREN], u64) {
+    type V<S> = f32x8<S>;
+    let origin = volume.origin();
+    let boxes = Boxes {
+        center: [0, 1, 2].map(|k| V::load(simd, &node.center[k]) - origin[k]),
+        half: [0, 1, 2].map(|k| V::load(simd, &node.half[k])),
+    };
+    let [lo, hi] = lambda.map(|x| V::broadcast(simd, x));
+    let (lo, hi, meets) = volume.meets(test, &boxes, lo, hi);
+    let (mut los, mut his) = ([0.0; CHILDREN], [0.0; CHILDREN]);
+    lo.store(&mut los);
+    hi.store(&mut his);
+    (los, his, V::<S>::bits(meets))
+}

@@ -1,0 +1,218 @@
+//! One frame from end to end: the only place where the stages meet.
+
+use std::time::Instant;
+
+use glam::Vec3;
+
+use crate::backend::cpu::{Cpu, direct};
+use crate::backend::{Backend, ExecuteReport};
+use crate::camera::Eye;
+use crate::context::Context;
+use crate::error::Result;
+use crate::image::{Picture, Planes};
+use crate::methods::{FrameInput, Made, Method, Params};
+use crate::plan::{Plan, Reflection};
+use crate::scene::prepared::{PreparedScene, milliseconds};
+use crate::visibility::{self, NONE_ID, SurfaceMesh, Visibility};
+
+/// What a frame did and took. Times in milliseconds; a stage that was not timed apart is `None`.
+#[derive(Clone, Debug, Default)]
+pub struct FrameReport {
+    /// Method id.
+    pub method: &'static str,
+    /// Backend id.
+    pub backend: &'static str,
+    /// Cameras (patch and object).
+    pub cameras: usize,
+    /// Batches.
+    pub batches: u64,
+    /// Camera–surfel pairs projected.
+    pub projections: u64,
+    /// Pairs with an image.
+    pub valid: u64,
+    /// Pixels whose centre shows a mirror.
+    pub mirror_pixels: usize,
+    /// Those that reflect an object.
+    pub covered_pixels: usize,
+    /// Mirror ids, depth and direct visibility.
+    pub ids_ms: Option<f64>,
+    /// Visible patches and their cameras.
+    pub cameras_ms: Option<f64>,
+    /// Culling.
+    pub cull_ms: Option<f64>,
+    /// Projection.
+    pub project_ms: Option<f64>,
+    /// Splatting.
+    pub splat_ms: Option<f64>,
+    /// The whole reflected layer, wall time: patches, cameras, clear, cull, project, splat, resolve.
+    pub layer_ms: Option<f64>,
+    /// Tracing the reflected rays, wall time.
+    pub rays_ms: Option<f64>,
+    /// Direct view, environment and composite.
+    pub composite_ms: Option<f64>,
+    /// All of it, wall time.
+    pub frame_ms: Option<f64>,
+}
+
+impl FrameReport {
+    /// Share of the projected pairs that have an image; `None` if there were none.
+    pub fn valid_share(&self) -> Option<f64> {
+        (self.projections > 0).then(|| self.valid as f64 / self.projections as f64)
+    }
+
+    /// The last report with every time replaced by the median over all.
+    ///
+    /// # Panics
+    /// If there are none.
+    pub fn median(reports: &[Self]) -> Self {
+        let of = |pick: fn(&Self) -> Option<f64>| {
+            let mut values: Vec<f64> = reports.iter().filter_map(pick).collect();
+            values.sort_by(f64::total_cmp);
+            let n = values.len();
+            (n > 0).then(|| 0.5 * (values[(n - 1) / 2] + values[n / 2]))
+        };
+        Self {
+            ids_ms: of(|r| r.ids_ms),
+            cameras_ms: of(|r| r.cameras_ms),
+            cull_ms: of(|r| r.cull_ms),
+            project_ms: of(|r| r.project_ms),
+            splat_ms: of(|r| r.splat_ms),
+            layer_ms: of(|r| r.layer_ms),
+            rays_ms: of(|r| r.rays_ms),
+            composite_ms: of(|r| r.composite_ms),
+            frame_ms: of(|r| r.frame_ms),
+            ..reports.last().expect("at least one report").clone()
+        }
+    }
+}
+
+/// Renders frames; keeps its memory between them.
+pub struct Renderer {
+    backend: Box<dyn Backend>,
+    visibility: Visibility,
+    scratch: visibility::Scratch,
+    reflection: Reflection,
+    picture: Picture,
+}
+
+impl Default for Renderer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Renderer {
+    /// A renderer on the CPU.
+    pub fn new() -> Self {
+        Self {
+            backend: Box::new(Cpu::default()),
+            visibility: Visibility::default(),
+            scratch: visibility::Scratch::default(),
+            reflection: Reflection::default(),
+            picture: Picture::black(0, 0),
+        }
+    }
+
+    /// Renders one frame. With `planes` it also keeps what every mirror pixel shows.
+    ///
+    /// # Errors
+    /// The method cannot draw this scene, or the work was cancelled.
+    pub fn render(
+        &mut self,
+        scene: &PreparedScene,
+        eye: &Eye,
+        method: &dyn Method,
+        params: &Params,
+        planes: bool,
+        cx: &Context,
+    ) -> Result<FrameReport> {
+        method.qualify(scene, params)?;
+        let made = method.prepare(scene, params, cx)?;
+        let start = Instant::now();
+        let ids_ms = self.see(scene, eye);
+        let (mut report, _) = self.reflect(scene, eye, method, &made, params, planes)?;
+        let composite = Instant::now();
+        self.compose(scene, eye);
+        report.ids_ms = Some(ids_ms);
+        report.composite_ms = Some(milliseconds(composite));
+        report.frame_ms = Some(milliseconds(start));
+        Ok(report)
+    }
+
+    /// The first stage: what the eye sees directly. Returns its milliseconds.
+    pub fn see(&mut self, scene: &PreparedScene, eye: &Eye) -> f64 {
+        let start = Instant::now();
+        let mirrors: Vec<SurfaceMesh> = scene
+            .mirrors
+            .iter()
+            .map(|m| SurfaceMesh { positions: &m.positions, triangles: m.mesh.triangles() })
+            .collect();
+        let objects: Vec<SurfaceMesh> = scene
+            .objects
+            .iter()
+            .map(|o| SurfaceMesh { positions: &o.positions, triangles: o.mesh.triangles() })
+            .collect();
+        self.visibility.update(eye, &mirrors, &objects, &mut self.scratch);
+        milliseconds(start)
+    }
+
+    /// The second stage: the reflection, for the eye that was last seen from.
+    ///
+    /// # Errors
+    /// The backend failed.
+    pub fn reflect(
+        &mut self,
+        scene: &PreparedScene,
+        eye: &Eye,
+        method: &dyn Method,
+        made: &Made,
+        params: &Params,
+        planes: bool,
+    ) -> Result<(FrameReport, ExecuteReport)> {
+        let start = Instant::now();
+        let mut plan = Plan::default();
+        let input = FrameInput { scene, eye, visibility: &self.visibility };
+        method.plan(input, made, params, &mut plan)?;
+        let planned_ms = milliseconds(start);
+        let done =
+            self.backend.execute(&plan, scene, &self.visibility, planes, &mut self.reflection)?;
+        let report = FrameReport {
+            method: method.info().id,
+            backend: self.backend.id(),
+            cameras: done.cameras,
+            batches: done.batches,
+            projections: done.projections,
+            valid: done.valid,
+            mirror_pixels: self.visibility.mirror_ids.iter().filter(|&&id| id != NONE_ID).count(),
+            covered_pixels: self.reflection.coverage.iter().filter(|&&c| c > 0.0).count(),
+            cameras_ms: done.passes_ms.map(|_| plan.times.cameras_ms),
+            cull_ms: done.cull_ms,
+            project_ms: done.project_ms,
+            splat_ms: done.splat_ms,
+            layer_ms: done.passes_ms.map(|ms| ms + planned_ms),
+            rays_ms: done.rays_ms,
+            ..FrameReport::default()
+        };
+        Ok((report, done))
+    }
+
+    /// The last stage: environment, tint, direct view.
+    fn compose(&mut self, scene: &PreparedScene, eye: &Eye) {
+        direct::compose(scene, eye, &self.visibility, &mut self.reflection, &mut self.picture);
+    }
+
+    /// The picture of the last frame, linear RGB.
+    pub fn picture(&self) -> &Picture {
+        &self.picture
+    }
+
+    /// What every mirror pixel of the last frame shows, if it was asked for.
+    pub fn planes(&self) -> Option<&Planes> {
+        self.reflection.planes.as_deref()
+    }
+
+    /// The reflection's radiance by pixel, before environment and tint; zero where nothing landed.
+    pub fn reflection(&self) -> &[Vec3] {
+        &self.reflection.radiance
+    }
+}

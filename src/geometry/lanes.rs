@@ -1,0 +1,244 @@
+//! Real numbers in lanes: the numeric kernels are written once over [`Real`] and run on f32, f64 and on
+//! vectors of any width. None of the operations is fused or approximate, so every instruction set gives
+//! the same bits.
+
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+use fearless_simd::{Level, Select, Simd, SimdBase, SimdFloat, SimdFrom, SimdMask, f32x8, f32x16};
+
+/// A scalar that camera constants are stored in.
+pub trait Scalar:
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// Rounds to this type.
+    fn from_f64(value: f64) -> Self;
+    /// Exact.
+    fn to_f64(self) -> f64;
+}
+
+impl Scalar for f32 {
+    #[expect(clippy::cast_possible_truncation, reason = "the one rounding")]
+    fn from_f64(value: f64) -> Self {
+        value as Self
+    }
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+impl Scalar for f64 {
+    fn from_f64(value: f64) -> Self {
+        value
+    }
+    fn to_f64(self) -> f64 {
+        self
+    }
+}
+
+/// One or several numbers that go through the same arithmetic.
+pub trait Real:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + Add<Self::Scalar, Output = Self>
+    + Sub<Self::Scalar, Output = Self>
+    + Mul<Self::Scalar, Output = Self>
+{
+    /// The type of one lane.
+    type Scalar: Scalar;
+    /// One truth value a lane.
+    type Mask: Copy
+        + BitAnd<Output = Self::Mask>
+        + BitOr<Output = Self::Mask>
+        + Not<Output = Self::Mask>;
+
+    /// `value` in every lane; `self` only says which lanes.
+    fn splat(self, value: Self::Scalar) -> Self;
+    /// `self < other`; false where one is NaN.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// `self <= other`; false where one is NaN.
+    fn le(self, other: Self) -> Self::Mask;
+    /// `mask ? a : b`.
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Whether some lane is true.
+    fn any(mask: Self::Mask) -> bool;
+    /// Square root, correctly rounded.
+    fn sqrt(self) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+
+    /// The smaller one; `other` where one is NaN.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self::select(self.lt(other), self, other)
+    }
+    /// The larger one; `other` where one is NaN.
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self::select(other.lt(self), self, other)
+    }
+}
+
+macro_rules! scalar_real {
+    ($t:ty) => {
+        impl Real for $t {
+            type Scalar = $t;
+            type Mask = bool;
+            #[inline(always)]
+            fn splat(self, value: $t) -> Self {
+                value
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> bool {
+                self < other
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> bool {
+                self <= other
+            }
+            #[inline(always)]
+            fn select(mask: bool, a: Self, b: Self) -> Self {
+                if mask { a } else { b }
+            }
+            #[inline(always)]
+            fn any(mask: bool) -> bool {
+                mask
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$t>::sqrt(self)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                <$t>::abs(self)
+            }
+        }
+    };
+}
+scalar_real!(f32);
+scalar_real!(f64);
+
+/// f32 lanes in a vector register (or several).
+pub trait Vector<S: Simd>: Real<Scalar = f32> {
+    /// Number of lanes.
+    const LANES: usize;
+    /// `value` in every lane.
+    fn broadcast(simd: S, value: f32) -> Self;
+    /// The first `LANES` elements of `slice`.
+    fn load(simd: S, slice: &[f32]) -> Self;
+    /// Into the first `LANES` elements of `slice`.
+    fn store(self, slice: &mut [f32]);
+    /// Bit i = lane i.
+    fn bits(mask: Self::Mask) -> u64;
+    /// Lane i = bit i.
+    fn mask(simd: S, bits: u64) -> Self::Mask;
+}
+
+macro_rules! vector_real {
+    ($t:ident, $n:literal) => {
+        impl<S: Simd> Real for $t<S> {
+            type Scalar = f32;
+            type Mask = <Self as SimdBase<S>>::Mask;
+            #[inline(always)]
+            fn splat(self, value: f32) -> Self {
+                Self::simd_from(fearless_simd::ExtractToken::token(&self), value)
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> Self::Mask {
+                self.simd_lt(other)
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> Self::Mask {
+                self.simd_le(other)
+            }
+            #[inline(always)]
+            fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
+                mask.select(a, b)
+            }
+            #[inline(always)]
+            fn any(mask: Self::Mask) -> bool {
+                mask.any_true()
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                SimdFloat::sqrt(self)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                SimdFloat::copysign(self, Real::splat(self, 0.0))
+            }
+        }
+
+        impl<S: Simd> Vector<S> for $t<S> {
+            const LANES: usize = $n;
+            #[inline(always)]
+            fn broadcast(simd: S, value: f32) -> Self {
+                Self::simd_from(simd, value)
+            }
+            #[inline(always)]
+            fn load(simd: S, slice: &[f32]) -> Self {
+                Self::from_slice(simd, &slice[..$n])
+            }
+            #[inline(always)]
+            fn store(self, slice: &mut [f32]) {
+                self.store_slice(&mut slice[..$n]);
+            }
+            #[inline(always)]
+            fn bits(mask: Self::Mask) -> u64 {
+                mask.to_bitmask()
+            }
+            #[inline(always)]
+            fn mask(simd: S, bits: u64) -> Self::Mask {
+                <Self::Mask as SimdMask<S>>::from_bitmask(simd, bits)
+            }
+        }
+    };
+}
+vector_real!(f32x8, 8);
+vector_real!(f32x16, 16);
+
+/// Environment variable that lowers the instruction set: `sse2`, `sse4.2` or `avx2`.
+pub const SIMD_VARIABLE: &str = "CATOPTRIC_SIMD";
+
+/// The best instruction set of this machine, or the lower one that [`SIMD_VARIABLE`] names.
+pub fn simd_level() -> Level {
+    let best = Level::new();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Ok(name) = std::env::var(SIMD_VARIABLE) {
+        let lower = match name.as_str() {
+            "sse2" => best.as_sse2().map(Level::Sse2),
+            "sse4.2" => best.as_sse4_2().map(Level::Sse4_2),
+            "avx2" => best.as_avx2().map(Level::Avx2),
+            _ => None,
+        };
+        return lower.unwrap_or(best);
+    }
+    best
+}
+
+/// Dot product.
+#[inline(always)]
+pub fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Dot product with a constant vector.
+#[inline(always)]
+pub fn dot_const<R: Real>(a: [R; 3], b: [R::Scalar; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Cross product.
+#[inline(always)]
+pub fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

@@ -1,0 +1,237 @@
+//! From visible patches to cameras: construction rays, guard band, whole-object rejection, object space.
+
+use fearless_simd::{Level, dispatch};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::accel::kd_tree::{CHILDREN, WideNode};
+use crate::camera::Eye;
+use crate::camera::three_ray::multiplicity::mixed_sign_range;
+use crate::camera::three_ray::{BoxTest, RayScale, Rays, ThreeRay, ViewVolume, array};
+use crate::cull::test_children;
+use crate::geometry::Similarity;
+use crate::geometry::lanes::simd_level;
+use crate::plan::{CameraInstance, SplatShape};
+use crate::scene::prepared::PreparedScene;
+use crate::visibility::Patch;
+
+/// Surfels a hair behind the mirror still count as touching it: this share of the eye's distance (untuned).
+const CONTACT: f64 = 1e-5;
+/// λ ends at this many times the farthest object's distance over the shortest ray: rays interpolated much
+/// shorter than the three given ones are not followed further.
+const SHORTENING: f64 = 1e3;
+/// Largest guard as a weight: slivers on the screen would reach anywhere (untuned).
+const MAX_GUARD: f64 = 2.0;
+/// The guard of patches that reach behind the eye, where pixels are no measure.
+const GUARD_BEHIND_EYE: f64 = 0.25;
+
+/// What the cameras depend on besides the scene.
+#[derive(Clone, Copy)]
+pub(super) struct CameraSettings {
+    pub(super) ray_scale: RayScale,
+    pub(super) shape: SplatShape,
+}
+
+/// The cameras of all patches, by patch and object, and where each patch's begin.
+pub(super) fn cameras(
+    scene: &PreparedScene,
+    eye: &Eye,
+    patches: &[Patch],
+    settings: CameraSettings,
+) -> (Vec<CameraInstance>, Vec<u32>) {
+    let top = Top::new(scene, eye);
+    let lists: Vec<Vec<CameraInstance>> = patches
+        .par_chunks(32)
+        .enumerate()
+        .map(|(chunk, patches)| {
+            let mut list = Vec::new();
+            for (i, patch) in patches.iter().enumerate() {
+                let index = u32::try_from(chunk * 32 + i).expect("fewer patches than pixels");
+                of_patch(scene, eye, &top, patch, index, settings, &mut list);
+            }
+            list
+        })
+        .collect();
+    let cameras: Vec<CameraInstance> = lists.concat();
+    let mut starts = vec![0u32; patches.len() + 1];
+    for camera in &cameras {
+        starts[camera.patch as usize + 1] += 1;
+    }
+    for i in 0..patches.len() {
+        starts[i + 1] += starts[i];
+    }
+    (cameras, starts)
+}
+
+/// The objects' boxes in scene space, eight at a time.
+struct Top {
+    groups: Vec<WideNode>,
+    /// No object is farther from the eye than this.
+    reach: f64,
+    level: Level,
+}
+
+impl Top {
+    fn new(scene: &PreparedScene, eye: &Eye) -> Self {
+        let mut reach = 0.0f64;
+        let groups = scene
+            .objects
+            .chunks(CHILDREN)
+            .map(|objects| {
+                let mut group = WideNode::EMPTY;
+                for (slot, object) in objects.iter().enumerate() {
+                    group.set_box(slot, object.bounds);
+                    let b = object.bounds;
+                    let far = (b.min - eye.position).abs().max((b.max - eye.position).abs());
+                    reach = reach.max(far.as_dvec3().length());
+                }
+                group
+            })
+            .collect();
+        Self { groups, reach, level: simd_level() }
+    }
+}
+
+fn of_patch(
+    scene: &PreparedScene,
+    eye: &Eye,
+    top: &Top,
+    patch: &Patch,
+    index: u32,
+    settings: CameraSettings,
+    out: &mut Vec<CameraInstance>,
+) {
+    let (mirror, triangle) = scene.mirror_of(patch.triangle.0);
+    let mirror = &scene.mirrors[mirror];
+    let corner = mirror.mesh.triangles()[triangle];
+    let positions = corner.map(|i| mirror.positions[i as usize]);
+    let normals = corner.map(|i| mirror.normals[i as usize]);
+    let whole = construction_rays(eye.position, positions, normals, settings.ray_scale);
+    let rays = whole.part(patch.corners);
+    let [v1, v2, v3] = rays.origins;
+    if (v2 - v1).cross(v3 - v1) == DVec3::ZERO {
+        return;
+    }
+    let position = eye.position.as_dvec3();
+    let facing = |i: usize| normals[i].as_dvec3().dot(position - positions[i].as_dvec3());
+    let facing = DVec3::new(facing(0), facing(1), facing(2));
+    let front = linear_form(patch.corners.map(|w| w.dot(facing)));
+    let screen = screen_forms(eye, patch, rays.origins);
+    let guard = guard(eye, rays.origins, settings.shape);
+    let grown = rays.grown(guard);
+    let volume = ViewVolume::<f32>::new(&grown);
+    let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
+    let size = rays.origins.map(|v| (v - position).length());
+    let farthest = size.iter().fold(0.0, |m: f64, &s| m.max(s));
+    #[expect(clippy::cast_possible_truncation, reason = "a bound, not a measure")]
+    let lambda = [
+        (-CONTACT * farthest / shortest) as f32,
+        (SHORTENING * (top.reach + farthest) / shortest) as f32,
+    ];
+    for (g, group) in top.groups.iter().enumerate() {
+        let (lo, hi, mut bits) =
+            dispatch!(top.level, simd => test_children(simd, group, &volume, BoxTest::Slab, lambda));
+        bits &= group.used;
+        while bits != 0 {
+            let slot = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let object = g * CHILDREN + slot;
+            let to_scene = &scene.objects[object].to_scene;
+            let own = rays_in(to_scene, &rays);
+            let own_grown = rays_in(to_scene, &grown);
+            let range = [lo[slot], hi[slot]];
+            let several = mixed_sign_range(&own_grown, range[0].into(), range[1].into());
+            let from_eye = rays
+                .origins
+                .map(|v| to_scene.inverse_direction(v - position) / to_scene.scale);
+            #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
+            out.push(CameraInstance {
+                patch: index,
+                object: u32::try_from(object).expect("fewer than 2^32 objects"),
+                camera: ThreeRay::new(&own, &own_grown),
+                volume: ViewVolume::new(&own_grown),
+                lambda: range,
+                several: several.map_or([1.0, 0.0], |(a, b)| [a as f32, b as f32]),
+                scale: to_scene.scale as f32,
+                screen,
+                guard: array(guard),
+                front,
+                from_eye: [0, 1, 2].map(|k| linear_form(from_eye.map(|v| v[k]))),
+            });
+        }
+    }
+}
+
+/// The camera of a whole mirror triangle: rays reflected at its vertices.
+pub(crate) fn construction_rays(
+    eye: Vec3,
+    positions: [Vec3; 3],
+    normals: [Vec3; 3],
+    scale: RayScale,
+) -> Rays {
+    let origins = positions.map(|p| p.as_dvec3());
+    let direction = |i: usize| {
+        let view = origins[i] - eye.as_dvec3();
+        let normal = normals[i].as_dvec3().normalize_or(DVec3::Y);
+        let reflected = view - normal * (2.0 * view.dot(normal));
+        match scale {
+            RayScale::EyeDistance => reflected,
+            RayScale::Unit => reflected.normalize_or(DVec3::Y),
+        }
+    };
+    Rays { origins, directions: [direction(0), direction(1), direction(2)] }
+}
+
+fn rays_in(to_scene: &Similarity, rays: &Rays) -> Rays {
+    Rays {
+        origins: rays.origins.map(|v| to_scene.inverse_point(v)),
+        directions: rays.directions.map(|d| to_scene.inverse_direction(d) / to_scene.scale),
+    }
+}
+
+/// Values at the corners as value_1 + b2·(value_2 - value_1) + b3·(value_3 - value_1).
+#[expect(clippy::cast_possible_truncation, reason = "rounded once")]
+fn linear_form(values: [f64; 3]) -> [f32; 3] {
+    let [a, b, c] = values;
+    [a as f32, (b - a) as f32, (c - a) as f32]
+}
+
+fn homogeneous(eye: &Eye, v: DVec3) -> DVec3 {
+    let p = v - eye.position.as_dvec3();
+    let w = p.dot(eye.forward.as_dvec3());
+    let focal = f64::from(eye.focal_px);
+    DVec3::new(
+        focal * p.dot(eye.right.as_dvec3()) + 0.5 * f64::from(eye.size.width) * w,
+        -focal * p.dot(eye.up.as_dvec3()) + 0.5 * f64::from(eye.size.height) * w,
+        w,
+    )
+}
+
+fn screen_forms(eye: &Eye, patch: &Patch, corners: [DVec3; 3]) -> [[f32; 3]; 3] {
+    let [left, top] = patch.rect.min.map(f64::from);
+    let h = corners.map(|v| homogeneous(eye, v));
+    [
+        linear_form(h.map(|h| h.x - left * h.z)),
+        linear_form(h.map(|h| h.y - top * h.z)),
+        linear_form(h.map(|h| h.z)),
+    ]
+}
+
+/// How far a splat's centre may lie outside the triangle and still cover one of its pixels, as weights.
+fn guard(eye: &Eye, corners: [DVec3; 3], shape: SplatShape) -> DVec3 {
+    let reach_px = match shape {
+        SplatShape::Square1 => 0.5 + 0.5,
+        SplatShape::Square2 => 1.0 + 0.5,
+    };
+    let h = corners.map(|v| homogeneous(eye, v));
+    if h.iter().any(|h| h.z <= 0.0) {
+        return DVec3::splat(GUARD_BEHIND_EYE);
+    }
+    let s = h.map(|h| h.truncate() / h.z);
+    let area = (s[1] - s[0]).perp_dot(s[2] - s[0]).abs();
+    let of = |i: usize| {
+        let edge = (s[(i + 2) % 3] - s[(i + 1) % 3]).length();
+        (reach_px * edge / area.max(f64::MIN_POSITIVE)).min(MAX_GUARD)
+    };
+    DVec3::new(of(0), of(1), of(2))
+}

@@ -1,0 +1,134 @@
+//! The hybrid method of Mei, Popescu & Sacks 2007: every visible mirror triangle is a continuous 3-ray camera,
+//! culled against the surfels' trees (backward), which then projects and splats what is left (forward).
+
+pub(crate) mod cameras;
+
+use std::time::Instant;
+
+use super::{FrameInput, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, Preset, Value};
+use crate::camera::three_ray::{BoxTest, RayScale};
+use crate::cull::Culler;
+use crate::error::Result;
+use crate::plan::{DepthKey, Pass, Plan, SplatPass, SplatShape};
+use crate::scene::prepared::milliseconds;
+use crate::visibility::{MirrorTriangleIndex, PatchScratch, patches};
+
+/// See the module.
+pub struct C3rc;
+
+static INFO: MethodInfo = MethodInfo {
+    id: "c3rc",
+    about: "point splatting with continuous 3-ray cameras",
+    citation: "Mei, Popescu & Sacks 2007, A Hybrid Backward-Forward Method for Interactive Reflections",
+    params: &[
+        ParamInfo {
+            id: "test",
+            about: "how tree nodes are tested against a camera's view volume (paper: not conservative)",
+            unit: "",
+            kind: ParamKind::Choice(&["none", "interval", "sweep", "slab", "paper"]),
+            default: Value::Choice("slab"),
+            is_quality_knob: false,
+        },
+        ParamInfo {
+            id: "splat",
+            about: "pixels that a surfel covers: the one it falls on, or 2 x 2",
+            unit: "",
+            kind: ParamKind::Choice(&["square1", "square2"]),
+            default: Value::Choice("square2"),
+            is_quality_knob: true,
+        },
+        ParamInfo {
+            id: "depth",
+            about: "what decides which surfel is nearest (push-back: the paper's key)",
+            unit: "",
+            kind: ParamKind::Choice(&["lambda", "push-back"]),
+            default: Value::Choice("lambda"),
+            is_quality_knob: false,
+        },
+        ParamInfo {
+            id: "ray-scale",
+            about: "length of a camera's three rays (unit: as in the paper)",
+            unit: "",
+            kind: ParamKind::Choice(&["eye-distance", "unit"]),
+            default: Value::Choice("eye-distance"),
+            is_quality_knob: false,
+        },
+        ParamInfo {
+            id: "roots",
+            about: "images of a point that a camera draws: all, or only the first as in the paper",
+            unit: "",
+            kind: ParamKind::Choice(&["all", "first"]),
+            default: Value::Choice("all"),
+            is_quality_knob: false,
+        },
+    ],
+    presets: &[Preset {
+        id: "paper",
+        about: "as Mei et al.: unit rays, their box test, leaves of 122, 1-pixel squares, first root, push-back depth",
+        params: &[
+            ("test", "paper"),
+            ("splat", "square1"),
+            ("depth", "push-back"),
+            ("ray-scale", "unit"),
+            ("roots", "first"),
+        ],
+        leaf_points: Some(122),
+    }],
+};
+
+/// Which rays a word of the parameter `ray-scale` means.
+pub(crate) fn ray_scale(word: &str) -> RayScale {
+    if word == "unit" { RayScale::Unit } else { RayScale::EyeDistance }
+}
+
+impl Method for C3rc {
+    fn info(&self) -> &'static MethodInfo {
+        &INFO
+    }
+
+    fn plan<'a>(
+        &self,
+        frame: FrameInput<'a>,
+        _made: &Made,
+        params: &Params,
+        out: &mut Plan<'a>,
+    ) -> Result<()> {
+        let start = Instant::now();
+        let scene = frame.scene;
+        let shape = match params.choice("splat") {
+            "square1" => SplatShape::Square1,
+            _ => SplatShape::Square2,
+        };
+        let settings = cameras::CameraSettings { ray_scale: ray_scale(params.choice("ray-scale")), shape };
+        let corners = |t: MirrorTriangleIndex| {
+            let (mirror, triangle) = scene.mirror_of(t.0);
+            let mirror = &scene.mirrors[mirror];
+            mirror.mesh.triangles()[triangle].map(|i| mirror.positions[i as usize])
+        };
+        let mut list = Vec::new();
+        patches(frame.eye, frame.visibility, corners, &mut PatchScratch::default(), &mut list);
+        let (cameras, patch_cameras) = cameras::cameras(scene, frame.eye, &list, settings);
+        out.times.cameras_ms = milliseconds(start);
+        let test = match params.choice("test") {
+            "none" => BoxTest::None,
+            "interval" => BoxTest::Interval,
+            "sweep" => BoxTest::Sweep,
+            "paper" => BoxTest::Paper,
+            _ => BoxTest::Slab,
+        };
+        out.passes.push(Pass::Splat(Box::new(SplatPass {
+            patches: list,
+            cameras,
+            patch_cameras,
+            batches: Box::new(Culler::new(scene, test)),
+            shape,
+            depth: match params.choice("depth") {
+                "push-back" => DepthKey::PushBack,
+                _ => DepthKey::Lambda,
+            },
+            first_root_only: params.choice("roots") == "first",
+        })));
+        out.passes.push(Pass::Resolve);
+        Ok(())
+    }
+}

@@ -1,0 +1,111 @@
+//! The registry of reflection methods: a method is one file (or folder) and one line in [`METHODS`].
+
+pub mod c3rc;
+pub mod params;
+pub mod ray_traced;
+
+use std::any::Any;
+use std::sync::Arc;
+
+pub use params::{ParamInfo, ParamKind, Params, Value};
+
+use crate::camera::Eye;
+use crate::context::Context;
+use crate::error::Result;
+use crate::plan::Plan;
+use crate::scene::prepared::PreparedScene;
+use crate::visibility::Visibility;
+
+/// What is known of a method without running it.
+#[derive(Debug)]
+pub struct MethodInfo {
+    /// Short name, as after `--method`.
+    pub id: &'static str,
+    /// One line for people.
+    pub about: &'static str,
+    /// Where it comes from.
+    pub citation: &'static str,
+    /// Its parameters.
+    pub params: &'static [ParamInfo],
+    /// Named sets of values.
+    pub presets: &'static [Preset],
+}
+
+/// A named set of parameter values.
+#[derive(Debug)]
+pub struct Preset {
+    /// Short name, as after `--preset`.
+    pub id: &'static str,
+    /// One line for people.
+    pub about: &'static str,
+    /// Parameters and their values as text.
+    pub params: &'static [(&'static str, &'static str)],
+    /// Surfels a tree leaf holds at most, if the preset says.
+    pub leaf_points: Option<u32>,
+}
+
+impl MethodInfo {
+    /// The parameter of that id.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn param(&self, id: &str) -> &ParamInfo {
+        self.params.iter().find(|p| p.id == id).expect("the method has this parameter")
+    }
+}
+
+/// Everything a frame depends on besides the method's parameters.
+#[derive(Clone, Copy)]
+pub struct FrameInput<'a> {
+    /// The scene.
+    pub scene: &'a PreparedScene,
+    /// The eye.
+    pub eye: &'a Eye,
+    /// What the eye sees first.
+    pub visibility: &'a Visibility,
+}
+
+/// What a method makes once per scene.
+pub type Made = Arc<dyn Any + Send + Sync>;
+
+/// A way to render reflections.
+pub trait Method: Send + Sync {
+    /// Name, citation, parameters.
+    fn info(&self) -> &'static MethodInfo;
+
+    /// Whether the method can draw this scene.
+    ///
+    /// # Errors
+    /// Says why not.
+    fn qualify(&self, _scene: &PreparedScene, _params: &Params) -> Result<()> {
+        Ok(())
+    }
+
+    /// Makes what only depends on the scene.
+    ///
+    /// # Errors
+    /// Cancelled.
+    fn prepare(&self, _scene: &PreparedScene, _params: &Params, _cx: &Context) -> Result<Made> {
+        Ok(Arc::new(()))
+    }
+
+    /// Writes a frame's passes into `out`, which is empty.
+    ///
+    /// # Errors
+    /// Cancelled.
+    fn plan<'a>(
+        &self,
+        frame: FrameInput<'a>,
+        made: &Made,
+        params: &Params,
+        out: &mut Plan<'a>,
+    ) -> Result<()>;
+}
+
+/// All methods; the first is the default.
+pub static METHODS: [&dyn Method; 2] = [&c3rc::C3rc, &ray_traced::RayTraced];
+
+/// The method of that id.
+pub fn method(id: &str) -> Option<&'static dyn Method> {
+    METHODS.into_iter().find(|m| m.info().id == id)
+}

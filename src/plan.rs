@@ -1,0 +1,189 @@
+//! A frame as data: passes over named resources, in order. Methods write plans, backends execute them.
+
+use crate::camera::three_ray::{ThreeRay, ViewVolume};
+use crate::visibility::Patch;
+
+/// One camera: a patch of a mirror and an object, in the object's space.
+#[derive(Clone, Debug)]
+pub struct CameraInstance {
+    /// Index into [`SplatPass::patches`].
+    pub patch: u32,
+    /// Index of the object.
+    pub object: u32,
+    /// The projection's constants.
+    pub camera: ThreeRay<f32>,
+    /// The grown camera's view volume.
+    pub volume: ViewVolume<f32>,
+    /// λ that can meet the object.
+    pub lambda: [f32; 2],
+    /// λ between which a point may have several images; reversed if nowhere.
+    pub several: [f32; 2],
+    /// Length in the scene of a unit of the object's space.
+    pub scale: f32,
+    /// Homogeneous pixel coordinates (x·w, y·w, w) relative to the patch's rectangle, linear in (b2, b3).
+    pub screen: [[f32; 3]; 3],
+    /// How far outside the triangle images are drawn, by weight.
+    pub guard: [f32; 3],
+    /// Positive where the ray leaves the mirror on its front side, linear in (b2, b3).
+    pub front: [f32; 3],
+    /// v(w) - eye in object space by coordinate, linear in (b2, b3): for push-back depth.
+    pub from_eye: [[f32; 3]; 3],
+}
+
+/// A range of surfels that a camera is to project.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Batch {
+    /// First surfel, over the whole scene.
+    pub first: u32,
+    /// Number of surfels.
+    pub count: u32,
+    /// λ that can meet them.
+    pub lambda: [f32; 2],
+    /// 1 if the theorem allows one image a point, else 3.
+    pub roots: u32,
+}
+
+/// Where batches come from: the culling, as the backend sees it. It asks for as much as it can use at a time.
+pub trait BatchSource: Send + Sync {
+    /// Appends the batches of one camera, in surfel order.
+    fn cull(&self, camera: &CameraInstance, out: &mut Vec<Batch>);
+}
+
+/// Which pixels a projected surfel covers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SplatShape {
+    /// The pixel that it falls on.
+    Square1,
+    /// The 2 × 2 pixels around it.
+    #[default]
+    Square2,
+}
+
+/// What decides which surfel is nearest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DepthKey {
+    /// λ|d(w)|: the distance from the mirror.
+    #[default]
+    Lambda,
+    /// The paper's: the distance from the eye to the mirror plus that.
+    PushBack,
+}
+
+/// Projects surfels and keeps the nearest at every pixel.
+pub struct SplatPass<'a> {
+    /// Visible parts of the mirrors.
+    pub patches: Vec<Patch>,
+    /// By patch, then by object.
+    pub cameras: Vec<CameraInstance>,
+    /// Patch i owns cameras `patch_cameras[i]..patch_cameras[i + 1]`.
+    pub patch_cameras: Vec<u32>,
+    /// The culling.
+    pub batches: Box<dyn BatchSource + 'a>,
+    /// Footprint.
+    pub shape: SplatShape,
+    /// Depth.
+    pub depth: DepthKey,
+    /// Keep only the first root that has an image, as the paper's vertex program.
+    pub first_root_only: bool,
+}
+
+/// Computes the reflection pixel by pixel.
+pub struct GatherPass<'a> {
+    /// What to compute.
+    pub kernel: Box<dyn GatherKernel + 'a>,
+}
+
+/// A computation per mirror pixel, called on runs of pixels.
+pub trait GatherKernel: Send + Sync {
+    /// Prepares what all pixels share (ray lists, say) and computes every pixel of the reflection.
+    fn gather(&self, out: &mut Reflection) -> GatherTimes;
+}
+
+/// What a gather pass took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GatherTimes {
+    /// Tracing the reflected rays, milliseconds.
+    pub rays_ms: f64,
+    /// Number of rays.
+    pub rays: usize,
+}
+
+/// The reflection of all mirrors: one element a pixel of the picture, by row.
+#[derive(Clone, Debug, Default)]
+pub struct Reflection {
+    /// Linear RGB; what is not covered is left to the environment.
+    pub radiance: Vec<glam::Vec3>,
+    /// Share of the pixel covered by objects.
+    pub coverage: Vec<f32>,
+    /// What was seen, where asked for.
+    pub planes: Option<Box<crate::image::Planes>>,
+}
+
+/// Things that passes read and write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resource {
+    /// Mirror triangle ids of the pixels: there before the first pass.
+    Ids,
+    /// Nearest surfel of each pixel.
+    Keys,
+    /// The reflection.
+    Reflection,
+}
+
+/// One step of a frame.
+pub enum Pass<'a> {
+    /// Ids → Keys.
+    Splat(Box<SplatPass<'a>>),
+    /// Keys → Reflection.
+    Resolve,
+    /// Ids → Reflection.
+    Gather(GatherPass<'a>),
+}
+
+impl Pass<'_> {
+    /// What must be there before.
+    pub fn reads(&self) -> &'static [Resource] {
+        match self {
+            Self::Splat(_) | Self::Gather(_) => &[Resource::Ids],
+            Self::Resolve => &[Resource::Keys],
+        }
+    }
+
+    /// What is there afterwards.
+    pub fn writes(&self) -> &'static [Resource] {
+        match self {
+            Self::Splat(_) => &[Resource::Keys],
+            Self::Resolve | Self::Gather(_) => &[Resource::Reflection],
+        }
+    }
+}
+
+/// A frame's passes in order.
+#[derive(Default)]
+pub struct Plan<'a> {
+    /// In order.
+    pub passes: Vec<Pass<'a>>,
+    /// Time spent on planning, by stage.
+    pub times: PlanTimes,
+}
+
+/// What planning took, milliseconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PlanTimes {
+    /// Listing the visible patches and making their cameras.
+    pub cameras_ms: f64,
+}
+
+impl Plan<'_> {
+    /// The first resource that some pass reads before it was written.
+    pub fn missing_resource(&self) -> Option<Resource> {
+        let mut there = vec![Resource::Ids];
+        for pass in &self.passes {
+            if let Some(r) = pass.reads().iter().find(|r| !there.contains(r)) {
+                return Some(*r);
+            }
+            there.extend(pass.writes());
+        }
+        None
+    }
+}

@@ -1,0 +1,330 @@
+//! A scene made ready to be rendered: surfels in leaf order, trees, triangles. Everything a frame depends on
+//! besides the eye and its parameters.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::{DVec3, Vec3};
+
+use super::description::{Environment, EyeDescription, Light, Object, Paint, Scene};
+use super::{sample, shade};
+use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::geometry::surfel::PADDING;
+use crate::geometry::{Aabb, Mesh, Similarity, Surfels};
+
+/// How a scene is prepared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrepareOptions {
+    /// Surfels over all objects.
+    pub surfels: usize,
+    /// When tree nodes become leaves.
+    pub tree: KdTreeLimits,
+    /// Seed of the sampling.
+    pub seed: u64,
+}
+
+impl Default for PrepareOptions {
+    fn default() -> Self {
+        Self { surfels: DEFAULT_SURFELS, tree: KdTreeLimits::default(), seed: 1 }
+    }
+}
+
+/// Fits the built-in scenes without holes; about 200 MB.
+pub const DEFAULT_SURFELS: usize = 3_000_000;
+/// Surfel indices are 32 bits, with one value kept for "none" and room for padding.
+pub const MAX_SURFELS: usize = (u32::MAX / 2) as usize;
+
+/// What preparing took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PrepareTimes {
+    /// Sampling the surfaces, milliseconds.
+    pub sample_ms: f64,
+    /// Building the kd-trees, milliseconds.
+    pub tree_ms: f64,
+    /// Shading with shadow rays, the triangles' BVH included, milliseconds.
+    pub shade_ms: f64,
+}
+
+/// A mirror in scene space.
+#[derive(Clone, Debug)]
+pub struct PreparedMirror {
+    /// As in the scene.
+    pub name: String,
+    /// The mesh as given.
+    pub mesh: Arc<Mesh>,
+    /// Vertices in scene space.
+    pub positions: Vec<Vec3>,
+    /// Unit vertex normals in scene space.
+    pub normals: Vec<Vec3>,
+    /// Linear RGB factor of the reflection.
+    pub tint: Vec3,
+    /// Index of its first triangle over all mirrors.
+    pub first_triangle: u32,
+}
+
+/// A diffuse object: its surfels and tree live in its own space and never move.
+#[derive(Clone, Debug)]
+pub struct PreparedObject {
+    /// As in the scene.
+    pub name: String,
+    /// The mesh as given.
+    pub mesh: Arc<Mesh>,
+    /// Its colour.
+    pub paint: Paint,
+    /// Object space to scene space.
+    pub to_scene: Similarity,
+    /// Vertices in scene space.
+    pub positions: Vec<Vec3>,
+    /// Over its surfels; ranges are relative to `surfels.start`.
+    pub tree: KdTree,
+    /// Its part of the scene's surfels.
+    pub surfels: Range<u32>,
+    /// Contains its surfels, scene space.
+    pub bounds: Aabb,
+}
+
+/// See the module. Scene space is world space less `origin`.
+pub struct PreparedScene {
+    /// As in the scene.
+    pub name: String,
+    /// World position of scene space's zero: near the mirrors, so that f32 is exact enough anywhere.
+    pub origin: DVec3,
+    /// The scene's own eye.
+    pub eye: EyeDescription,
+    /// Mirrors.
+    pub mirrors: Vec<PreparedMirror>,
+    /// Objects.
+    pub objects: Vec<PreparedObject>,
+    /// All surfels, object by object, each in leaf order.
+    pub surfels: Surfels,
+    /// The objects' triangles in scene space, object by object.
+    pub triangles: TriangleBvh,
+    /// The mirrors' triangles in scene space, mirror by mirror.
+    pub mirror_triangles: TriangleBvh,
+    /// What rays meet that meet nothing else.
+    pub environment: Environment,
+    /// Sun and ambient.
+    pub light: Light,
+    /// What preparing took.
+    pub times: PrepareTimes,
+    /// How many trees were built since this scene was prepared: moving objects builds none.
+    pub tree_builds: usize,
+}
+
+impl PreparedScene {
+    /// Samples, sorts and shades a scene.
+    ///
+    /// # Errors
+    /// Too many surfels, or cancelled.
+    pub fn new(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Result<Self> {
+        if options.surfels == 0 || options.surfels > MAX_SURFELS {
+            return Err(Error::input(
+                "--surfels",
+                "",
+                format!("{} is not between 1 and {MAX_SURFELS}", options.surfels),
+                "choose a number in that range",
+            ));
+        }
+        if options.tree.leaf_points == 0 {
+            return Err(Error::input("--leaf", "", "0 is not a leaf size", "choose 1 or more"));
+        }
+        let mut times = PrepareTimes::default();
+        let start = Instant::now();
+        let sampled = sample_objects(scene, options, cx)?;
+        times.sample_ms = milliseconds(start);
+
+        let start = Instant::now();
+        let mut surfels = Surfels::default();
+        let mut objects = Vec::with_capacity(sampled.len());
+        let origin = mirror_center(scene);
+        for (object, mut own) in scene.objects.iter().zip(sampled) {
+            cx.step("building trees", objects.len() as f64 / scene.objects.len() as f64)?;
+            let tree = KdTree::build(&mut own, options.tree);
+            let first = index(surfels.len());
+            append(&mut surfels, own);
+            objects.push(PreparedObject {
+                name: object.name.clone(),
+                mesh: Arc::clone(&object.mesh),
+                paint: object.paint,
+                to_scene: Similarity::IDENTITY,
+                positions: Vec::new(),
+                tree,
+                surfels: first..index(surfels.len()),
+                bounds: Aabb::EMPTY,
+            });
+        }
+        pad(&mut surfels);
+        times.tree_ms = milliseconds(start);
+
+        let mut prepared = Self {
+            name: scene.name.clone(),
+            origin,
+            eye: scene.eye,
+            mirrors: prepare_mirrors(scene, origin),
+            tree_builds: objects.len(),
+            objects,
+            surfels,
+            triangles: TriangleBvh::build(&[]),
+            mirror_triangles: TriangleBvh::build(&[]),
+            environment: scene.environment,
+            light: scene.light,
+            times,
+        };
+        let corners: Vec<[Vec3; 3]> = prepared
+            .mirrors
+            .iter()
+            .flat_map(|m| m.mesh.triangles().iter().map(|t| t.map(|i| m.positions[i as usize])))
+            .collect();
+        prepared.mirror_triangles = TriangleBvh::build(&corners);
+        for (i, object) in scene.objects.iter().enumerate() {
+            prepared.place(i, &object.transform);
+        }
+        let start = Instant::now();
+        prepared.shade(cx)?;
+        prepared.times.shade_ms = milliseconds(start);
+        Ok(prepared)
+    }
+
+    /// Moves an object (object space to world). Its surfels and tree stay as they are; call
+    /// [`PreparedScene::shade`] when light and shadows should follow.
+    pub fn place(&mut self, object: usize, transform: &Similarity) {
+        let to_scene =
+            Similarity { translation: transform.translation - self.origin, ..*transform };
+        let object = &mut self.objects[object];
+        object.to_scene = to_scene;
+        object.positions = to_scene_positions(&object.mesh, &to_scene);
+        let local = object.tree.bounds();
+        let corner = |i: u32| {
+            let pick = |bit: u32, lo: f32, hi: f32| if i >> bit & 1 == 0 { lo } else { hi };
+            DVec3::new(
+                pick(0, local.min.x, local.max.x).into(),
+                pick(1, local.min.y, local.max.y).into(),
+                pick(2, local.min.z, local.max.z).into(),
+            )
+        };
+        let bounds = Aabb::of((0..8).map(|i| to_scene.point(corner(i)).as_vec3()));
+        // The corners were rounded.
+        let slack = (bounds.min.abs().max(bounds.max.abs())) * (2.0 * f32::EPSILON);
+        object.bounds = Aabb { min: bounds.min - slack, max: bounds.max + slack };
+    }
+
+    /// Rebuilds the triangles' BVH from the objects' places and shades all surfels.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub fn shade(&mut self, cx: &Context) -> Result<()> {
+        let corners: Vec<[Vec3; 3]> = self
+            .objects
+            .iter()
+            .flat_map(|o| o.mesh.triangles().iter().map(|t| t.map(|i| o.positions[i as usize])))
+            .collect();
+        self.triangles = TriangleBvh::build(&corners);
+        for object in &self.objects {
+            let range = object.surfels.start as usize..object.surfels.end as usize;
+            shade::bake(&mut self.surfels, range, &object.to_scene, &self.triangles, &self.light, cx)?;
+        }
+        Ok(())
+    }
+
+    /// Number of mirror triangles over all mirrors.
+    pub fn mirror_triangle_count(&self) -> usize {
+        self.mirrors.iter().map(|m| m.mesh.triangles().len()).sum()
+    }
+
+    /// The mirror of a mirror triangle and the triangle's index in it.
+    pub fn mirror_of(&self, triangle: u32) -> (usize, usize) {
+        let mirror = self.mirrors.partition_point(|m| m.first_triangle <= triangle) - 1;
+        (mirror, (triangle - self.mirrors[mirror].first_triangle) as usize)
+    }
+
+    /// The object of a surfel.
+    pub fn object_of_surfel(&self, surfel: u32) -> usize {
+        self.objects.partition_point(|o| o.surfels.end <= surfel)
+    }
+}
+
+/// Milliseconds since `start`.
+pub(crate) fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+fn index(n: usize) -> u32 {
+    u32::try_from(n).expect("fewer than 2^32 surfels")
+}
+
+fn sample_objects(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Result<Vec<Surfels>> {
+    let areas: Vec<f64> =
+        scene.objects.iter().map(|o| o.mesh.area() * o.transform.scale.powi(2)).collect();
+    let densities: Vec<f64> = scene.objects.iter().map(|o| o.density).collect();
+    let counts = sample::allot(&areas, &densities, options.surfels);
+    let mut list = Vec::with_capacity(counts.len());
+    for (object, count) in scene.objects.iter().zip(counts) {
+        list.push(sample::sample(&object.mesh, &object.paint, count, options.seed, cx)?);
+    }
+    Ok(list)
+}
+
+fn prepare_mirrors(scene: &Scene, origin: DVec3) -> Vec<PreparedMirror> {
+    let mut first_triangle = 0;
+    scene
+        .mirrors
+        .iter()
+        .map(|m| {
+            let to_scene =
+                Similarity { translation: m.transform.translation - origin, ..m.transform };
+            let mirror = PreparedMirror {
+                name: m.name.clone(),
+                mesh: Arc::clone(&m.mesh),
+                positions: to_scene_positions(&m.mesh, &to_scene),
+                normals: m
+                    .mesh
+                    .normals()
+                    .iter()
+                    .map(|n| to_scene.direction(n.as_dvec3()).as_vec3())
+                    .collect(),
+                tint: m.tint,
+                first_triangle,
+            };
+            first_triangle += index(m.mesh.triangles().len());
+            mirror
+        })
+        .collect()
+}
+
+/// The middle of the mirrors' box, rounded to what f32 holds exactly near it.
+fn mirror_center(scene: &Scene) -> DVec3 {
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for mirror in &scene.mirrors {
+        for p in mirror.mesh.positions() {
+            let p = mirror.transform.point(p.as_dvec3());
+            (min, max) = (min.min(p), max.max(p));
+        }
+    }
+    let center = (min + max) * 0.5;
+    if center.is_finite() { center.round() } else { DVec3::ZERO }
+}
+
+fn to_scene_positions(mesh: &Mesh, to_scene: &Similarity) -> Vec<Vec3> {
+    mesh.positions().iter().map(|p| to_scene.point(p.as_dvec3()).as_vec3()).collect()
+}
+
+fn append(all: &mut Surfels, own: Surfels) {
+    let n = own.len();
+    all.x.extend(&own.x[..n]);
+    all.y.extend(&own.y[..n]);
+    all.z.extend(&own.z[..n]);
+    all.normals.extend(own.normals);
+    all.albedo.extend(own.albedo);
+    all.radiance.extend(own.radiance);
+    all.extent.extend(own.extent);
+}
+
+fn pad(surfels: &mut Surfels) {
+    for list in [&mut surfels.x, &mut surfels.y, &mut surfels.z] {
+        let last = list.last().copied().unwrap_or(0.0);
+        list.extend([last; PADDING]);
+    }
+}
