@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use crate::backend::cpu::{Cpu, direct};
+use crate::backend::cpu::{Cpu, finish};
 use crate::backend::{Backend, ExecuteReport};
 use crate::camera::Eye;
 use crate::context::Context;
@@ -13,7 +13,7 @@ use crate::image::{Picture, Planes};
 use crate::methods::{FrameInput, Made, Method, Params};
 use crate::plan::{Plan, Reflection};
 use crate::scene::prepared::{PreparedScene, milliseconds};
-use crate::visibility::{self, NONE_ID, SurfaceMesh, Visibility};
+use crate::visibility::{self, NONE_ID, Visibility};
 
 /// What a frame did and took. Times in milliseconds; a stage that was not timed apart is `None`.
 #[derive(Clone, Debug, Default)]
@@ -93,6 +93,7 @@ pub struct Renderer {
     scratch: visibility::Scratch,
     reflection: Reflection,
     picture: Picture,
+    white: f32,
 }
 
 impl Default for Renderer {
@@ -110,7 +111,13 @@ impl Renderer {
             scratch: visibility::Scratch::default(),
             reflection: Reflection::default(),
             picture: Picture::black(0, 0),
+            white: 1.0,
         }
+    }
+
+    /// Keeps values brighter than a display's white, for pictures in floating point.
+    pub fn keep_bright(&mut self) {
+        self.white = f32::INFINITY;
     }
 
     /// Renders one frame. With `planes` it also keeps what every mirror pixel shows.
@@ -142,16 +149,8 @@ impl Renderer {
     /// The first stage: what the eye sees directly. Returns its milliseconds.
     pub fn see(&mut self, scene: &PreparedScene, eye: &Eye) -> f64 {
         let start = Instant::now();
-        let mirrors: Vec<SurfaceMesh> = scene
-            .mirrors
-            .iter()
-            .map(|m| SurfaceMesh { positions: &m.positions, triangles: m.mesh.triangles() })
-            .collect();
-        let objects: Vec<SurfaceMesh> = scene
-            .objects
-            .iter()
-            .map(|o| SurfaceMesh { positions: &o.positions, triangles: o.mesh.triangles() })
-            .collect();
+        let mirrors = finish::mirror_surfaces(scene);
+        let objects = finish::object_surfaces(scene);
         self.visibility.update(eye, &mirrors, &objects, &mut self.scratch);
         milliseconds(start)
     }
@@ -198,7 +197,8 @@ impl Renderer {
 
     /// The last stage: environment, tint, direct view.
     fn compose(&mut self, scene: &PreparedScene, eye: &Eye) {
-        direct::compose(scene, eye, &self.visibility, &mut self.reflection, &mut self.picture);
+        let (reflection, picture) = (&mut self.reflection, &mut self.picture);
+        finish::finish(scene, eye, &self.visibility, reflection, self.white, picture);
     }
 
     /// The picture of the last frame, linear RGB.

@@ -29,7 +29,7 @@ struct Cli {
 #[derive(Subcommand, Debug)]
 enum Verb {
     Render(Box<RenderArgs>),
-    Compare(commands::compare::CompareArgs),
+    Compare(commands::compare::Args),
     Info(commands::info::InfoArgs),
     Bench(Box<BenchArgs>),
 }
@@ -71,7 +71,7 @@ fn run(cli: &Cli, matches: &clap::ArgMatches, cx: &Context) -> anyhow::Result<()
     let verb = matches.subcommand().map(|(_, own)| own);
     match (&cli.command, verb) {
         (Some(Verb::Render(args)), Some(own)) => commands::render::run(args, own, cx),
-        (Some(Verb::Compare(args)), _) => commands::compare::run(args),
+        (Some(Verb::Compare(args)), _) => commands::compare::run(args.clone()),
         (Some(Verb::Info(args)), _) => commands::info::run(args, cx),
         (Some(Verb::Bench(args)), Some(own)) => {
             let What::Layer(layer) = &args.what;

@@ -115,6 +115,8 @@ pub struct Reflection {
     pub radiance: Vec<glam::Vec3>,
     /// Share of the pixel covered by objects.
     pub coverage: Vec<f32>,
+    /// The environment behind the objects is in `radiance` already.
+    pub environment_included: bool,
     /// What was seen, where asked for.
     pub planes: Option<Box<crate::image::Planes>>,
 }

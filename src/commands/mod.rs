@@ -5,7 +5,7 @@ pub mod compare;
 pub mod info;
 pub mod render;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context as _;
@@ -76,9 +76,12 @@ fn point(text: &str) -> Result<DVec3, String> {
 }
 
 fn size(text: &str) -> Result<ImageSize, String> {
-    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let sides =
+        text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     match sides {
-        Some((width, height)) if (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height) => {
+        Some((width, height))
+            if (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height) =>
+        {
             Ok(ImageSize { width, height })
         }
         Some(_) => Err(format!("each side must be from 1 to {MAX_SIDE} pixels")),
@@ -183,7 +186,11 @@ pub(crate) fn with_method_flags(mut command: Command) -> Command {
             let unit = if p.unit.is_empty() { String::new() } else { format!(", {}", p.unit) };
             let help = format!("{}{unit} [{}; {}]", p.about, p.takes(), users.join(", "));
             command = command.arg(
-                Arg::new(p.id).long(p.id).value_name(p.value_name()).help(help).help_heading("Method parameters"),
+                Arg::new(p.id)
+                    .long(p.id)
+                    .value_name(p.value_name())
+                    .help(help)
+                    .help_heading("Method parameters"),
             );
         }
     }
@@ -198,7 +205,12 @@ pub(crate) fn chosen_method(
 ) -> Result<(&'static dyn Method, Params, Option<u32>)> {
     let ids: Vec<&str> = METHODS.iter().map(|m| m.info().id).collect();
     let chosen = method(id).ok_or_else(|| {
-        Error::input("--method", "", format!("there is no method \"{id}\""), format!("use one of {}", ids.join(", ")))
+        Error::input(
+            "--method",
+            "",
+            format!("there is no method \"{id}\""),
+            format!("use one of {}", ids.join(", ")),
+        )
     })?;
     let info = chosen.info();
     let mut params = Params::defaults(info.params);
@@ -206,7 +218,11 @@ pub(crate) fn chosen_method(
     if let Some(name) = preset {
         let preset = info.presets.iter().find(|p| p.id == name).ok_or_else(|| {
             let names: Vec<&str> = info.presets.iter().map(|p| p.id).collect();
-            let remedy = if names.is_empty() { "leave it out".into() } else { format!("use {}", names.join(", ")) };
+            let remedy = if names.is_empty() {
+                "leave it out".into()
+            } else {
+                format!("use {}", names.join(", "))
+            };
             Error::input("--preset", "", format!("{id} has no preset \"{name}\""), remedy)
         })?;
         leaf = preset.leaf_points;
@@ -255,5 +271,5 @@ pub(crate) fn ms(value: Option<f64>) -> Value {
 
 /// Refuses an output that cannot be written before any work is done.
 pub(crate) fn check_json(path: Option<&PathBuf>) -> Result<()> {
-    path.map_or(Ok(()), |p: &PathBuf| catoptric::image::io::check_folder(p as &Path))
+    path.map_or(Ok(()), |p| catoptric::image::io::check_place(p))
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use catoptric::frame::{FrameReport, Renderer};
 use catoptric::image::aov::write_aov;
 use catoptric::image::io::{check_output, write_picture};
-use catoptric::methods::METHODS;
 use catoptric::{Context, Error};
 use clap::{ArgMatches, Args};
 use serde_json::{Value, json};
@@ -57,6 +56,9 @@ pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyh
         chosen_method(&args.how.method, args.how.preset.as_deref(), matches)?;
     let ready = args.scene.ready(leaf, cx)?;
     let mut renderer = Renderer::new();
+    if !args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        renderer.keep_bright();
+    }
     let mut reports = Vec::new();
     for i in 0..args.repeat {
         if args.repeat > 1 {
@@ -81,7 +83,12 @@ pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyh
 fn check_aov(path: &Path) -> Result<(), Error> {
     let exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     if !exr {
-        return Err(Error::file(path, "", "AOVs are written as EXR only", "give a name that ends in .exr"));
+        return Err(Error::file(
+            path,
+            "",
+            "AOVs are written as EXR only",
+            "give a name that ends in .exr",
+        ));
     }
     check_output(path)
 }
@@ -162,9 +169,4 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
     ];
     let timed = stages.iter().filter_map(|(name, ms)| ms.map(|ms| format!("{name} {ms:.1}")));
     println!("  ms: {}", timed.collect::<Vec<_>>().join(", "));
-}
-
-/// The ids of all methods, for messages.
-pub(crate) fn method_ids() -> String {
-    METHODS.iter().map(|m| m.info().id).collect::<Vec<_>>().join(", ")
 }

@@ -46,7 +46,9 @@ impl ParamInfo {
             (ParamKind::Choice(words), Value::Choice(word)) => {
                 format!("{}; default {word}", words.join(" | "))
             }
-            (ParamKind::Integer(min, max), Value::Integer(n)) => format!("{min} to {max}; default {n}"),
+            (ParamKind::Integer(min, max), Value::Integer(n)) => {
+                format!("{min} to {max}; default {n}")
+            }
             (_, default) => format!("{default:?}"),
         }
     }

@@ -1,3 +1,19 @@
 //! What is to be rendered: read, made or given, then sampled, shaded and sorted into trees.
 
+#[cfg(feature = "cli")]
+pub mod arrange;
+pub mod builtin;
 pub mod description;
+pub mod environment;
+#[cfg(feature = "cli")]
+pub mod file;
+pub mod fit;
+#[cfg(feature = "cli")]
+mod library;
+#[cfg(feature = "cli")]
+pub mod load;
+pub mod prepared;
+pub mod sample;
+pub mod shade;
+
+pub use prepared::{PrepareOptions, PreparedScene};

@@ -7,9 +7,10 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
-use super::description::{Environment, EyeDescription, Light, Object, Paint, Scene};
+use super::description::{Environment, EyeDescription, Light, Paint, Scene};
 use super::{sample, shade};
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
+use crate::camera::MirrorTriangle;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::surfel::PADDING;
@@ -84,6 +85,25 @@ pub struct PreparedObject {
     pub surfels: Range<u32>,
     /// Contains its surfels, scene space.
     pub bounds: Aabb,
+    /// Index of its first triangle over all objects.
+    pub first_triangle: u32,
+}
+
+impl PreparedObject {
+    /// Reflectance at a point of a triangle, linear RGB.
+    pub fn albedo(&self, triangle: usize, weights: [f32; 3]) -> Vec3 {
+        let corner = self.mesh.triangles()[triangle];
+        let at = |k: usize| self.mesh.positions()[corner[k] as usize] * weights[k];
+        self.paint.color(&self.mesh, triangle, weights, at(0) + at(1) + at(2))
+    }
+
+    /// Interpolated unit normal at a point of a triangle, scene space.
+    pub fn normal(&self, triangle: usize, weights: [f32; 3]) -> Vec3 {
+        let corner = self.mesh.triangles()[triangle];
+        let at = |k: usize| self.mesh.normals()[corner[k] as usize] * weights[k];
+        let local = at(0) + at(1) + at(2);
+        self.to_scene.direction(local.as_dvec3()).as_vec3().normalize_or(Vec3::Y)
+    }
 }
 
 /// See the module. Scene space is world space less `origin`.
@@ -140,6 +160,7 @@ impl PreparedScene {
         let mut surfels = Surfels::default();
         let mut objects = Vec::with_capacity(sampled.len());
         let origin = mirror_center(scene);
+        let mut first_triangle = 0;
         for (object, mut own) in scene.objects.iter().zip(sampled) {
             cx.step("building trees", objects.len() as f64 / scene.objects.len() as f64)?;
             let tree = KdTree::build(&mut own, options.tree);
@@ -154,7 +175,9 @@ impl PreparedScene {
                 tree,
                 surfels: first..index(surfels.len()),
                 bounds: Aabb::EMPTY,
+                first_triangle,
             });
+            first_triangle += index(object.mesh.triangles().len());
         }
         pad(&mut surfels);
         times.tree_ms = milliseconds(start);
@@ -224,7 +247,14 @@ impl PreparedScene {
         self.triangles = TriangleBvh::build(&corners);
         for object in &self.objects {
             let range = object.surfels.start as usize..object.surfels.end as usize;
-            shade::bake(&mut self.surfels, range, &object.to_scene, &self.triangles, &self.light, cx)?;
+            shade::bake(
+                &mut self.surfels,
+                range,
+                &object.to_scene,
+                &self.triangles,
+                &self.light,
+                cx,
+            )?;
         }
         Ok(())
     }
@@ -238,6 +268,23 @@ impl PreparedScene {
     pub fn mirror_of(&self, triangle: u32) -> (usize, usize) {
         let mirror = self.mirrors.partition_point(|m| m.first_triangle <= triangle) - 1;
         (mirror, (triangle - self.mirrors[mirror].first_triangle) as usize)
+    }
+
+    /// Corners and normals of a mirror triangle.
+    pub fn mirror_triangle(&self, triangle: u32) -> MirrorTriangle {
+        let (mirror, triangle) = self.mirror_of(triangle);
+        let mirror = &self.mirrors[mirror];
+        let corner = mirror.mesh.triangles()[triangle];
+        MirrorTriangle {
+            corners: corner.map(|i| mirror.positions[i as usize]),
+            normals: corner.map(|i| mirror.normals[i as usize]),
+        }
+    }
+
+    /// The object of one of [`PreparedScene::triangles`] and the triangle's index in it.
+    pub fn object_of_triangle(&self, triangle: u32) -> (usize, usize) {
+        let object = self.objects.partition_point(|o| o.first_triangle <= triangle) - 1;
+        (object, (triangle - self.objects[object].first_triangle) as usize)
     }
 
     /// The object of a surfel.

@@ -108,7 +108,7 @@ pub fn patches(
 ) {
     out.clear();
     let (width, height) = (eye.size.width as usize, eye.size.height as usize);
-    let triangles = visibility.mirror_triangles as usize;
+    let triangles = visibility.mirror_triangles() as usize;
     let bands = rayon::current_num_threads().min(height);
     let rows = height.div_ceil(bands);
     scratch.extents.resize_with(bands, Vec::new);

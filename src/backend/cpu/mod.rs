@@ -1,6 +1,7 @@
 //! The CPU backend: all cores, SIMD, the same bits every run.
 
 pub mod direct;
+pub mod finish;
 mod planes;
 pub mod pool;
 pub mod splat;
@@ -47,6 +48,7 @@ impl Backend for Cpu {
             self::planes::mark_mirrors(scene, visibility, &mut planes);
             planes
         });
+        out.environment_included = false;
         let mut report = ExecuteReport::default();
         let add = |to: &mut Option<f64>, ms: f64| *to = Some(to.unwrap_or(0.0) + ms);
         for pass in &plan.passes {
@@ -54,7 +56,8 @@ impl Backend for Cpu {
             match pass {
                 Pass::Splat(pass) => {
                     self.clear(size.pixels());
-                    let done = splat::splat(pass, &scene.surfels, visibility, &self.scratch, &self.keys);
+                    let done =
+                        splat::splat(pass, &scene.surfels, visibility, &self.scratch, &self.keys);
                     add(&mut report.passes_ms, milliseconds(start));
                     report.cameras += pass.cameras.len();
                     report.patches += pass.patches.len();

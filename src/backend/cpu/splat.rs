@@ -84,7 +84,9 @@ pub(crate) fn splat(
         .into_par_iter()
         .map_init(
             || pool.take(),
-            |scratch, index| splat_patch(pass, surfels, visibility, index, level, width, scratch, keys),
+            |scratch, index| {
+                splat_patch(pass, surfels, visibility, index, level, width, scratch, keys)
+            },
         )
         .reduce(SplatCounters::default, SplatCounters::plus)
 }
@@ -247,7 +249,8 @@ impl Projection<'_> {
                         return;
                     }
                     let [x, y, lands] = self.place(&image, offset);
-                    let lands = zero.lt(lands) & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
+                    let lands =
+                        zero.lt(lands) & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
                     let mut bits = V::bits(drawn & lands);
                     if bits == 0 {
                         return;
@@ -260,7 +263,11 @@ impl Projection<'_> {
                         bits &= bits - 1;
                         let l = lane as usize;
                         // Not negative and less than the tile's size: the cast truncates, which is floor here.
-                        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "see above")]
+                        #[expect(
+                            clippy::cast_possible_truncation,
+                            clippy::cast_sign_loss,
+                            reason = "see above"
+                        )]
                         let slot = ys[l] as u32 * self.stride + xs[l] as u32;
                         let key = u64::from(depths[l].to_bits()) << 32 | u64::from(at + lane);
                         hits.push(Hit { key, slot });
@@ -288,9 +295,7 @@ impl Projection<'_> {
     #[inline(always)]
     pub(crate) fn depth<R: Real<Scalar = f32>>(&self, image: &Image<R>) -> R {
         let camera = &self.camera.camera;
-        let d = [0, 1, 2].map(|k| {
-            image.b2 * camera.f1[k] + image.b3 * camera.f2[k] + camera.d1[k]
-        });
+        let d = [0, 1, 2].map(|k| image.b2 * camera.f1[k] + image.b3 * camera.f2[k] + camera.d1[k]);
         let mut depth = image.lambda * dot(d, d).sqrt();
         if self.pass.depth == DepthKey::PushBack {
             let v = self.camera.from_eye.map(|form| image.linear(form));

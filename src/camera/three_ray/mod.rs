@@ -16,6 +16,7 @@ use glam::DVec3;
 
 use crate::geometry::lanes::Scalar;
 
+pub use super::mirror_ray::RayScale;
 pub use project::{Image, project};
 pub use volume::{BoxTest, Boxes, ViewVolume};
 
@@ -26,16 +27,6 @@ pub struct Rays {
     pub origins: [DVec3; 3],
     /// Their directions; the lengths matter, see [`RayScale`].
     pub directions: [DVec3; 3],
-}
-
-/// Which length the construction rays have.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RayScale {
-    /// |v_i - E|: exact for a plane mirror, whose rays meet in the mirrored eye.
-    #[default]
-    EyeDistance,
-    /// 1, as in the paper.
-    Unit,
 }
 
 impl Rays {

@@ -1,13 +1,14 @@
 //! From visible patches to cameras: construction rays, guard band, whole-object rejection, object space.
 
 use fearless_simd::{Level, dispatch};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
+use crate::camera::RayScale;
 use crate::camera::three_ray::multiplicity::mixed_sign_range;
-use crate::camera::three_ray::{BoxTest, RayScale, Rays, ThreeRay, ViewVolume, array};
+use crate::camera::three_ray::{BoxTest, Rays, ThreeRay, ViewVolume, array};
 use crate::cull::test_children;
 use crate::geometry::Similarity;
 use crate::geometry::lanes::simd_level;
@@ -101,20 +102,18 @@ fn of_patch(
     settings: CameraSettings,
     out: &mut Vec<CameraInstance>,
 ) {
-    let (mirror, triangle) = scene.mirror_of(patch.triangle.0);
-    let mirror = &scene.mirrors[mirror];
-    let corner = mirror.mesh.triangles()[triangle];
-    let positions = corner.map(|i| mirror.positions[i as usize]);
-    let normals = corner.map(|i| mirror.normals[i as usize]);
-    let whole = construction_rays(eye.position, positions, normals, settings.ray_scale);
+    let mirror = scene.mirror_triangle(patch.triangle.0);
+    let whole = Rays {
+        origins: mirror.corners.map(|v| v.as_dvec3()),
+        directions: mirror.corner_directions(eye.position, settings.ray_scale),
+    };
     let rays = whole.part(patch.corners);
     let [v1, v2, v3] = rays.origins;
     if (v2 - v1).cross(v3 - v1) == DVec3::ZERO {
         return;
     }
     let position = eye.position.as_dvec3();
-    let facing = |i: usize| normals[i].as_dvec3().dot(position - positions[i].as_dvec3());
-    let facing = DVec3::new(facing(0), facing(1), facing(2));
+    let facing = DVec3::from_array(mirror.facing(eye.position));
     let front = linear_form(patch.corners.map(|w| w.dot(facing)));
     let screen = screen_forms(eye, patch, rays.origins);
     let guard = guard(eye, rays.origins, settings.shape);
@@ -129,8 +128,7 @@ fn of_patch(
         (SHORTENING * (top.reach + farthest) / shortest) as f32,
     ];
     for (g, group) in top.groups.iter().enumerate() {
-        let (lo, hi, mut bits) =
-            dispatch!(top.level, simd => test_children(simd, group, &volume, BoxTest::Slab, lambda));
+        let (lo, hi, mut bits) = dispatch!(top.level, simd => test_children(simd, group, &volume, BoxTest::Slab, lambda));
         bits &= group.used;
         while bits != 0 {
             let slot = bits.trailing_zeros() as usize;
@@ -141,9 +139,8 @@ fn of_patch(
             let own_grown = rays_in(to_scene, &grown);
             let range = [lo[slot], hi[slot]];
             let several = mixed_sign_range(&own_grown, range[0].into(), range[1].into());
-            let from_eye = rays
-                .origins
-                .map(|v| to_scene.inverse_direction(v - position) / to_scene.scale);
+            let from_eye =
+                rays.origins.map(|v| to_scene.inverse_direction(v - position) / to_scene.scale);
             #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
             out.push(CameraInstance {
                 patch: index,
@@ -160,26 +157,6 @@ fn of_patch(
             });
         }
     }
-}
-
-/// The camera of a whole mirror triangle: rays reflected at its vertices.
-pub(crate) fn construction_rays(
-    eye: Vec3,
-    positions: [Vec3; 3],
-    normals: [Vec3; 3],
-    scale: RayScale,
-) -> Rays {
-    let origins = positions.map(|p| p.as_dvec3());
-    let direction = |i: usize| {
-        let view = origins[i] - eye.as_dvec3();
-        let normal = normals[i].as_dvec3().normalize_or(DVec3::Y);
-        let reflected = view - normal * (2.0 * view.dot(normal));
-        match scale {
-            RayScale::EyeDistance => reflected,
-            RayScale::Unit => reflected.normalize_or(DVec3::Y),
-        }
-    };
-    Rays { origins, directions: [direction(0), direction(1), direction(2)] }
 }
 
 fn rays_in(to_scene: &Similarity, rays: &Rays) -> Rays {

@@ -99,12 +99,9 @@ impl Method for C3rc {
             "square1" => SplatShape::Square1,
             _ => SplatShape::Square2,
         };
-        let settings = cameras::CameraSettings { ray_scale: ray_scale(params.choice("ray-scale")), shape };
-        let corners = |t: MirrorTriangleIndex| {
-            let (mirror, triangle) = scene.mirror_of(t.0);
-            let mirror = &scene.mirrors[mirror];
-            mirror.mesh.triangles()[triangle].map(|i| mirror.positions[i as usize])
-        };
+        let settings =
+            cameras::CameraSettings { ray_scale: ray_scale(params.choice("ray-scale")), shape };
+        let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
         let mut list = Vec::new();
         patches(frame.eye, frame.visibility, corners, &mut PatchScratch::default(), &mut list);
         let (cameras, patch_cameras) = cameras::cameras(scene, frame.eye, &list, settings);
