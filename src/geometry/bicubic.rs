@@ -80,8 +80,7 @@ fn bernstein(t: f64) -> [[f64; 4]; 3] {
 mod tests {
     use super::*;
 
-    /// The graph z = f(x, y) over the unit square as a patch: exact for cubics by their blossom at
-    /// the four corners' neighbours; here f = x² y + 2 x y³ - x.
+    /// The graph of z = x² y + 2 x y³ - x over the unit square as a patch.
     fn graph() -> BicubicPatch {
         // Bézier ordinates of 1, t, t², t³.
         let powers = [

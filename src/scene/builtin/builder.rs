@@ -92,7 +92,7 @@ impl Builder {
         }
     }
 
-    /// The finished mesh, each vertex through `place` first.
+    /// The finished mesh.
     ///
     /// # Panics
     /// If the shape is no mesh: a bug here, since nothing in it comes from outside.

@@ -27,7 +27,7 @@ fn square(wanted: usize, middle: DVec3, axes: [DVec3; 2]) -> Mesh {
 /// The unit cube standing on y = 0, its middle above the origin; each face has its own vertices.
 pub(super) fn cube(wanted: usize) -> Mesh {
     // One number of cuts an axis, so that faces meet in the same points; n, n, n to n + 1, n + 1, n + 1.
-    let cuts = |k: usize| [k / 3, (k + 1) / 3, (k + 2) / 3];
+    let cuts = |k: usize| [k, k + 1, k + 2].map(|n| n / 3);
     let count = |[x, y, z]: [usize; 3]| 4 * (x * y + y * z + z * x);
     let above = (3..).find(|&k| count(cuts(k)) >= wanted).unwrap_or(3);
     let best = [above - 1, above].into_iter().filter(|&k| k >= 3);

@@ -164,10 +164,9 @@ mod tests {
         // 28 rings of 32, the lid's 18 of 32 and its top, handle and spout 19 rings of 16 each.
         assert_eq!(mesh.positions().len(), 28 * 32 + 18 * 32 + 1 + 2 * 19 * 16);
         let bounds = mesh.bounds();
-        // Newell's figures: rim's and lid's extremes lie on control points.
+        // Extremes that are control points, since the surface is level there.
         assert_eq!((bounds.min.y, bounds.max.y), (0.15, 3.15));
         assert_eq!((bounds.min.z, bounds.max.z), (-2.0, 2.0));
-        // Handle: B(1/2) of -2.7.. is not reached, the outermost points are its shared patch ends.
         assert_eq!(bounds.max.x, 3.0);
         assert!(bounds.min.x < -3.3 && bounds.min.x > -3.525, "spout to -x");
     }

@@ -13,7 +13,7 @@ fn made(name: &str, triangles: Option<usize>) -> Mesh {
 
 /// Every shape at its default, at a tiny and at a larger count.
 fn all() -> impl Iterator<Item = (&'static str, Option<usize>, Mesh)> {
-    let counts = [None, Some(0), Some(1_000), Some(30_000)];
+    let counts = [None, Some(0), Some(2_100), Some(30_000)];
     SHAPES.iter().flat_map(move |&name| counts.map(|wanted| (name, wanted, made(name, wanted))))
 }
 
@@ -97,29 +97,25 @@ fn smooth_shapes_share_their_vertices() {
 
 #[test]
 fn triangles_are_well_shaped() {
-    // Bounds: measured, rounded down. The teapot's patches are what Newell made them.
+    // Least angles in degrees, as measured. The teapot's patches are what Newell made them.
     let shapes = [
-        ("sphere", 4_000, 30.0),
-        ("ellipsoid", 4_000, 20.0),
-        ("torus", 4_000, 25.0),
-        ("bowl", 4_000, 30.0),
-        ("wave", 4_000, 30.0),
-        ("cylinder", 2_000, 20.0),
-        ("cone", 2_000, 5.0),
-        ("goblet", 8_000, 5.0),
-        ("knot", 20_000, 15.0),
-        ("knot", 871_414, 15.0),
+        ("sphere", 4_000, 44.0),
+        ("ellipsoid", 4_000, 32.0),
+        ("torus", 4_000, 44.0),
+        ("bowl", 4_000, 44.0),
+        ("wave", 4_000, 40.0),
+        ("cylinder", 2_000, 38.0),
+        ("cone", 2_000, 36.0),
+        ("goblet", 8_000, 21.0),
+        ("knot", 20_000, 32.0),
+        ("knot", 871_414, 29.0),
     ];
     for (name, wanted, least) in shapes {
         let mesh = made(name, Some(wanted));
         let mut angles: Vec<f64> =
             (0..mesh.triangles().len()).map(|t| smallest_angle(corners(&mesh, t))).collect();
         angles.sort_unstable_by(f64::total_cmp);
-        let [worst, first, median] = [0, angles.len() / 100, angles.len() / 2].map(|k| angles[k]);
-        println!(
-            "{name}: {} triangles, worst {worst:.1}°, 1 % {first:.1}°, median {median:.1}°",
-            angles.len()
-        );
+        let [worst, median] = [0, angles.len() / 2].map(|k| angles[k]);
         assert!(worst > least, "{name}: {worst}");
         assert!(median > 30.0, "{name}: {median}");
     }
