@@ -77,7 +77,8 @@ pub fn scene_text(name: &str) -> Option<&'static str> {
     SCENE_TEXTS.iter().find(|scene| scene.0 == name).map(|scene| scene.1)
 }
 
-#[cfg(all(test, feature = "cli"))]
+#[cfg(test)]
+#[cfg(feature = "cli")]
 mod scene_tests;
 #[cfg(test)]
 mod tests;

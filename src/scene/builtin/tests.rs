@@ -4,6 +4,8 @@ use glam::DVec3;
 
 use super::*;
 
+const SMOOTH: [&str; 8] =
+    ["teapot", "sphere", "ellipsoid", "torus", "goblet", "bowl", "wave", "knot"];
 const CLOSED: [&str; 8] =
     ["sphere", "ellipsoid", "torus", "goblet", "cube", "cylinder", "cone", "knot"];
 
@@ -83,7 +85,7 @@ fn closed_shapes_are_watertight() {
 
 #[test]
 fn smooth_shapes_share_their_vertices() {
-    for name in ["teapot", "sphere", "ellipsoid", "torus", "goblet", "bowl", "wave", "knot"] {
+    for name in SMOOTH {
         let mesh = made(name, None);
         let mut places: Vec<_> =
             mesh.positions().iter().map(|p| p.to_array().map(f32::to_bits)).collect();
@@ -92,6 +94,22 @@ fn smooth_shapes_share_their_vertices() {
         // A corner of the teapot's handle lies on its belly without being part of it.
         let apart = places.len() + usize::from(name == "teapot");
         assert_eq!(apart, mesh.positions().len(), "{name}");
+    }
+}
+
+#[test]
+fn normals_are_those_of_a_fine_mesh() {
+    for name in SMOOTH {
+        let mesh = made(name, Some(100_000));
+        let (positions, triangles) = (mesh.positions().to_vec(), mesh.triangles().to_vec());
+        let averaged = Mesh::new(positions, Vec::new(), Vec::new(), triangles).unwrap();
+        let pairs = mesh.normals().iter().zip(averaged.normals());
+        let mut angles: Vec<f64> =
+            pairs.map(|(a, b)| a.as_dvec3().angle_between(b.as_dvec3()).to_degrees()).collect();
+        angles.sort_unstable_by(f64::total_cmp);
+        let most = angles[angles.len() * 98 / 100];
+        // The knot's finest relief is near what its grid can show; a wrong factor is tens of degrees.
+        assert!(most < 2.0, "{name}: {most} degrees");
     }
 }
 
