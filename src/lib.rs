@@ -1,11 +1,13 @@
 //! Catoptric: accurate reflections on curved mirrors without ray-tracing hardware.
 
+pub mod backend;
 pub mod camera;
 pub mod context;
 pub mod error;
 pub mod geometry;
 pub mod image;
 pub mod scene;
+pub mod visibility;
 
 pub use context::{Context, Progress};
 pub use error::{Error, Result};

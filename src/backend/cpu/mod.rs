@@ -1,0 +1,3 @@
+//! Frames on the CPU.
+
+pub mod direct;

@@ -1,0 +1,3 @@
+//! What executes a frame.
+
+pub mod cpu;
