@@ -1,0 +1,396 @@
+//! The final picture: what the eye sees directly, with the reflected layer on the mirrors, antialiased.
+//!
+//! A pixel is the average of its samples in linear light. Every sample is clamped to the display range
+//! *before* that: next to something brighter than white, an edge would otherwise be as jagged as without
+//! antialiasing, since a fifth of the pixel would already turn all of it white.
+
+use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::camera::Eye;
+use crate::visibility::{
+    NONE_ID, RayWeights, SAMPLE_EIGHTHS, SAMPLES, SurfaceMesh, Visibility, view_ray,
+};
+
+/// A point of an object that the eye sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Index of the object.
+    pub object: usize,
+    /// Index of the triangle within it.
+    pub triangle: usize,
+    /// Barycentric weights in that triangle; not negative, sum 1.
+    pub weights: [f32; 3],
+    /// The same point in scene space.
+    pub point: Vec3,
+}
+
+/// What surfaces and sky look like: the scene's side of [`compose`]. Colours are linear RGB.
+pub trait Appearance: Sync {
+    /// Reflectance at a point: asked for at every sample, so that patterns are antialiased as well.
+    fn albedo(&self, hit: &Hit) -> Vec3;
+
+    /// The light that the reflectance is multiplied by: asked for once for every object that a pixel
+    /// shows, since it may cost a shadow ray.
+    fn light(&self, hit: &Hit) -> Vec3;
+
+    /// Radiance from a direction (unit, scene space, away from the eye).
+    fn sky(&self, direction: Vec3) -> Vec3;
+
+    /// Factor of what a mirror reflects.
+    fn tint(&self, mirror: usize) -> Vec3;
+}
+
+/// What [`compose`] puts together.
+#[derive(Clone, Copy, Debug)]
+pub struct DirectView<'a> {
+    /// As given to [`Visibility::update`].
+    pub eye: &'a Eye,
+    /// As given to [`Visibility::update`].
+    pub mirrors: &'a [SurfaceMesh<'a>],
+    /// As given to [`Visibility::update`].
+    pub objects: &'a [SurfaceMesh<'a>],
+    /// What they look like from the eye.
+    pub visibility: &'a Visibility,
+    /// Per pixel: what the mirror at its centre reflects, linear RGB with the tint applied. Read where
+    /// `visibility.mirror_ids` is set.
+    pub reflection: &'a [Vec3],
+    /// The display's white, to which every channel of every sample is clamped; infinity for pictures that
+    /// keep brighter values.
+    pub white: f32,
+}
+
+/// Puts the picture together: `out` is row by row from the top left, linear RGB.
+///
+/// Objects get one reflectance a sample and one light; the sky gets one value. A mirror's samples get the
+/// pixel's own reflection, or, if another surface is at its centre, the mean of the neighbours that show
+/// the mirror at theirs, or, if there are none, the sky by the triangle's flat reflection.
+///
+/// # Panics
+/// If a plane has another size than the picture, or the surfaces are not those of the visibility.
+pub fn compose(view: &DirectView, appearance: &impl Appearance, out: &mut [Vec3]) {
+    let pixels = view.visibility.size.pixels();
+    assert_eq!((view.reflection.len(), out.len()), (pixels, pixels), "planes of one size");
+    let width = view.visibility.size.width as usize;
+    out.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
+        let mut row_of_pixels = Row { view, appearance, last: None };
+        for (x, pixel) in row.iter_mut().enumerate() {
+            *pixel = row_of_pixels.pixel(x, y);
+        }
+    });
+}
+
+/// What one sample shows.
+#[derive(Clone, Copy)]
+enum Seen {
+    Sky,
+    Surface { surface: usize, triangle: usize, id: u32 },
+}
+
+impl Seen {
+    /// Index of the surface; samples with equal ones are shaded together.
+    fn surface(self) -> Option<usize> {
+        match self {
+            Self::Sky => None,
+            Self::Surface { surface, .. } => Some(surface),
+        }
+    }
+}
+
+/// The samples of a pixel that show one surface.
+#[derive(Clone, Copy)]
+struct Group<'a> {
+    pixel: [usize; 2],
+    seen: &'a [Seen; SAMPLES],
+    surface: Option<usize>,
+}
+
+impl Group<'_> {
+    fn members(&self) -> impl Iterator<Item = usize> {
+        (0..SAMPLES).filter(|&s| self.seen[s].surface() == self.surface)
+    }
+
+    fn position_px(&self, sample: usize) -> DVec2 {
+        let [x, y] = SAMPLE_EIGHTHS[sample].map(|e| f64::from(e) / 8.0);
+        DVec2::new(self.pixel[0] as f64 + x, self.pixel[1] as f64 + y)
+    }
+
+    /// Mean position of the members, px.
+    fn middle_px(&self) -> DVec2 {
+        let sum: DVec2 = self.members().map(|s| self.position_px(s)).sum();
+        sum / self.members().count() as f64
+    }
+}
+
+/// Triangles of one surface, to look up an id without a search.
+#[derive(Clone, Copy)]
+struct Row<'a, A> {
+    view: &'a DirectView<'a>,
+    appearance: &'a A,
+    /// The triangle met last: neighbouring samples mostly meet the same.
+    last: Option<(u32, [Vec3; 3], RayWeights)>,
+}
+
+impl<A: Appearance> Row<'_, A> {
+    fn pixel(&mut self, x: usize, y: usize) -> Vec3 {
+        let visibility = self.view.visibility;
+        let at = y * visibility.size.width as usize + x;
+        let ids = visibility.samples[at];
+        let same = ids.iter().all(|&id| id == ids[0]);
+        if same && ids[0] < visibility.mirror_triangles() {
+            return self.displayed(self.view.reflection[at]);
+        }
+        let first = self.seen(ids[0]);
+        let seen = if same { [first; SAMPLES] } else { ids.map(|id| self.seen(id)) };
+        let mut sum = Vec3::ZERO;
+        for sample in 0..SAMPLES {
+            let surface = seen[sample].surface();
+            if seen[..sample].iter().any(|before| before.surface() == surface) {
+                continue;
+            }
+            let group = Group { pixel: [x, y], seen: &seen, surface };
+            let count = group.members().count() as f32;
+            sum += match seen[sample] {
+                Seen::Sky => self.displayed(self.sky(group.middle_px())) * count,
+                Seen::Surface { surface, triangle, id } if surface < visibility.mirrors() => {
+                    let corners = self.view.mirrors[surface].corners(triangle);
+                    let own = (ids[0] == id || first.surface() == Some(surface)).then_some(at);
+                    self.mirror(&group, surface, own, corners) * count
+                }
+                Seen::Surface { surface, .. } => {
+                    self.object(&group, surface - visibility.mirrors())
+                }
+            };
+        }
+        sum / SAMPLES as f32
+    }
+
+    fn seen(&self, id: u32) -> Seen {
+        match self.view.visibility.locate(id) {
+            Some((surface, triangle)) => Seen::Surface { surface, triangle, id },
+            None => Seen::Sky,
+        }
+    }
+
+    fn displayed(&self, radiance: Vec3) -> Vec3 {
+        radiance.clamp(Vec3::ZERO, Vec3::splat(self.view.white))
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "directions are f32")]
+    fn sky(&self, px: DVec2) -> Vec3 {
+        let direction = view_ray(self.view.eye, px).as_vec3();
+        self.appearance.sky(direction.normalize_or(self.view.eye.forward))
+    }
+
+    /// One sample's share of a mirror.
+    fn mirror(&self, group: &Group, mirror: usize, own: Option<usize>, corners: [Vec3; 3]) -> Vec3 {
+        if let Some(at) = own {
+            return self.displayed(self.view.reflection[at]);
+        }
+        let visibility = self.view.visibility;
+        let (width, height) = (visibility.size.width as usize, visibility.size.height as usize);
+        let [x, y] = group.pixel;
+        let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+        for row in y.saturating_sub(1)..(y + 2).min(height) {
+            for column in x.saturating_sub(1)..(x + 2).min(width) {
+                let at = row * width + column;
+                if visibility.ids(mirror).contains(&visibility.mirror_ids[at]) {
+                    sum += self.displayed(self.view.reflection[at]);
+                    count += 1.0;
+                }
+            }
+        }
+        if count > 0.0 {
+            return sum / count;
+        }
+        let direction = view_ray(self.view.eye, group.middle_px()).normalize_or(DVec3::ZERO);
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a).normalize_or(-direction);
+        let reflected = (direction - 2.0 * direction.dot(normal) * normal).as_vec3();
+        self.displayed(self.appearance.sky(reflected) * self.appearance.tint(mirror))
+    }
+
+    /// The sum of a group's samples on an object.
+    fn object(&mut self, group: &Group, object: usize) -> Vec3 {
+        let middle = group.middle_px();
+        let distance = |s: usize| group.position_px(s).distance_squared(middle);
+        let nearest = group.members().min_by(|&s, &t| distance(s).total_cmp(&distance(t)));
+        let Some(nearest) = nearest else { return Vec3::ZERO };
+        let lit = self.hit(group.seen[nearest], object, middle);
+        let light = self.appearance.light(&lit);
+        let mut sum = Vec3::ZERO;
+        for sample in group.members() {
+            let hit = self.hit(group.seen[sample], object, group.position_px(sample));
+            sum += self.displayed(self.appearance.albedo(&hit) * light);
+        }
+        sum
+    }
+
+    /// Where the view ray through `px` meets the triangle; its nearest point by weights where the ray
+    /// passes it, which it does by less than a pixel.
+    fn hit(&mut self, seen: Seen, object: usize, px: DVec2) -> Hit {
+        let (triangle, id) = match seen {
+            Seen::Surface { triangle, id, .. } => (triangle, id),
+            Seen::Sky => (0, NONE_ID),
+        };
+        let view = self.view;
+        let (_, corners, rays) = match self.last {
+            Some(last) if last.0 == id => last,
+            _ => {
+                let corners = view.objects[object].corners(triangle);
+                let made = (id, corners, RayWeights::new(view.eye, corners));
+                self.last = Some(made);
+                made
+            }
+        };
+        let weights = rays.at(view_ray(view.eye, px)).unwrap_or([1.0 / 3.0; 3]);
+        let weights = weights.map(|w| w.max(0.0));
+        let sum = weights[0] + weights[1] + weights[2];
+        let weights = weights.map(|w| w / sum);
+        let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+        Hit { object, triangle, weights, point }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec2, vec2, vec3};
+
+    use super::*;
+    use crate::camera::eye::ImageSize;
+    use crate::visibility::Scratch;
+
+    const SIZE: ImageSize = ImageSize { width: 24, height: 16 };
+    const SUN: f32 = 50.0;
+
+    /// Objects show their position, lit by a bright light; the sky shows its direction.
+    struct Plain;
+
+    impl Appearance for Plain {
+        fn albedo(&self, hit: &Hit) -> Vec3 {
+            hit.point.abs()
+        }
+        fn light(&self, _: &Hit) -> Vec3 {
+            Vec3::splat(SUN)
+        }
+        fn sky(&self, direction: Vec3) -> Vec3 {
+            direction.max(Vec3::ZERO)
+        }
+        fn tint(&self, _: usize) -> Vec3 {
+            vec3(0.5, 1.0, 1.0)
+        }
+    }
+
+    fn eye() -> Eye {
+        Eye::new(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0, SIZE).unwrap()
+    }
+
+    fn composed(
+        mirror: Option<[Vec3; 3]>,
+        object: Option<[Vec3; 3]>,
+        reflection: Vec3,
+        white: f32,
+    ) -> (Visibility, Vec<Vec3>) {
+        let eye = eye();
+        let mesh = |corners: &Option<[Vec3; 3]>| corners.map(|c| c.to_vec()).unwrap_or_default();
+        let (mirror_points, object_points) = (mesh(&mirror), mesh(&object));
+        let of =
+            |points: &[Vec3]| -> &[[u32; 3]] { if points.is_empty() { &[] } else { &[[0, 1, 2]] } };
+        let mirrors = [SurfaceMesh { positions: &mirror_points, triangles: of(&mirror_points) }];
+        let objects = [SurfaceMesh { positions: &object_points, triangles: of(&object_points) }];
+        let mut visibility = Visibility::default();
+        visibility.update(&eye, &mirrors, &objects, &mut Scratch::default());
+        let reflected: Vec<Vec3> = visibility
+            .mirror_ids
+            .iter()
+            .map(|&id| if id == NONE_ID { Vec3::NAN } else { reflection })
+            .collect();
+        let view = DirectView {
+            eye: &eye,
+            mirrors: &mirrors,
+            objects: &objects,
+            visibility: &visibility,
+            reflection: &reflected,
+            white,
+        };
+        let mut out = vec![Vec3::NAN; SIZE.pixels()];
+        compose(&view, &Plain, &mut out);
+        (visibility, out)
+    }
+
+    /// On the plane z = 0, as seen at these picture positions.
+    fn at(px: [Vec2; 3]) -> [Vec3; 3] {
+        px.map(|p| eye().position + eye().ray_through_px(p))
+    }
+
+    const HALF: [Vec2; 3] = [vec2(-30.0, -9.0), vec2(40.0, 7.0), vec2(-20.0, 60.0)];
+
+    #[test]
+    fn edges_are_shares_of_display_values() {
+        // The object lies at z = -9, so that it is white in z, where the sky is black.
+        let far = at(HALF).map(|p| DVec3::Z.as_vec3() + (p - DVec3::Z.as_vec3()) * 10.0);
+        let (visibility, out) = composed(None, Some(far), Vec3::ZERO, 1.0);
+        let mut partial = 0;
+        for (ids, value) in visibility.samples.iter().zip(&out) {
+            let share = ids.iter().filter(|&&id| id == 0).count() as f32 / SAMPLES as f32;
+            partial += usize::from(share > 0.0 && share < 1.0);
+            assert!((value.z - share).abs() < 1e-6, "{value} {share}");
+        }
+        assert!(partial > 5, "{partial}");
+    }
+
+    #[test]
+    fn objects_show_the_point_on_the_ray() {
+        let (visibility, out) = composed(None, Some(at(HALF)), Vec3::ZERO, f32::INFINITY);
+        let mut inside = 0;
+        for (pixel, (ids, value)) in visibility.samples.iter().zip(&out).enumerate() {
+            if *ids == [0; SAMPLES] {
+                let px = vec2((pixel % 24) as f32 + 0.5, (pixel / 24) as f32 + 0.5);
+                let point = eye().position + eye().ray_through_px(px);
+                // The mean of |x| over a symmetric pattern, where no axis crosses the pixel.
+                let point = point.abs() * SUN;
+                assert!(value.abs_diff_eq(point, 2e-3 * SUN / 2.0), "{px}: {value} {point}");
+                inside += 1;
+            }
+        }
+        assert!(inside > 50);
+    }
+
+    #[test]
+    fn mirrors_show_their_own_or_their_neighbours_reflection() {
+        let tone = vec3(0.2, 0.3, 0.4);
+        let (visibility, out) = composed(Some(at(HALF)), None, tone, 1.0);
+        let (mut own, mut borrowed) = (0, 0);
+        for (pixel, (ids, value)) in visibility.samples.iter().zip(&out).enumerate() {
+            let share = ids.iter().filter(|&&id| id == 0).count() as f32 / SAMPLES as f32;
+            if visibility.mirror_ids[pixel] == 0 {
+                own += 1;
+            } else if share > 0.0 {
+                borrowed += 1;
+            }
+            // In z the sky is black.
+            assert!((value.z - 0.4 * share).abs() < 1e-6, "{value} {share}");
+        }
+        assert!(own > 50 && borrowed > 2, "{own} {borrowed}");
+    }
+
+    #[test]
+    fn a_lone_mirror_sample_reflects_the_sky() {
+        // Over the sample (3, 1)/8 of pixel (5, 5) only, and tilted: it sends the view upwards and left.
+        let [a, b, c] = at([vec2(5.3, 5.05), vec2(5.45, 5.05), vec2(5.375, 5.2)]);
+        let tilted = [a, b, c - (c - eye().position) * 0.01];
+        let (visibility, out) = composed(Some(tilted), None, Vec3::ZERO, 1.0);
+        assert_eq!(visibility.samples[5 * 24 + 5], [NONE_ID, 0, NONE_ID, NONE_ID, NONE_ID]);
+        let px = vec2(5.375, 5.125);
+        let view = eye().ray_through_px(px).normalize_or(Vec3::ZERO);
+        let normal = (tilted[1] - tilted[0]).cross(tilted[2] - tilted[0]).normalize_or(Vec3::ZERO);
+        let mirrored = Plain.sky(view.reflect(normal)) * vec3(0.5, 1.0, 1.0);
+        assert!(mirrored.z > 0.1 || mirrored.y > 0.1 || mirrored.x > 0.1);
+        let others = [vec2(4.0, 4.0), vec2(7.0, 3.0), vec2(5.0, 7.0), vec2(1.0, 5.0)];
+        let middle = others.iter().sum::<Vec2>() / 32.0;
+        let sky = eye().ray_through_px(vec2(5.0, 5.0) + middle).normalize_or(Vec3::ZERO);
+        let expected = (mirrored + Plain.sky(sky) * 4.0) / 5.0;
+        let found = out[5 * 24 + 5];
+        assert!(found.abs_diff_eq(expected, 1e-5), "{found} {expected}");
+    }
+}
