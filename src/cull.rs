@@ -135,10 +135,18 @@ pub(crate) fn test_children<S: Simd>(
     type V<S> = f32x8<S>;
     let origin = volume.origin();
     let boxes = Boxes {
-        center: [0, 1, 2].map(|k| V::load(simd, &node.center[k]) - origin[k]),
-        half: [0, 1, 2].map(|k| V::load(simd, &node.half[k])),
+        center: [
+            V::load(simd, &node.center[0]) - origin[0],
+            V::load(simd, &node.center[1]) - origin[1],
+            V::load(simd, &node.center[2]) - origin[2],
+        ],
+        half: [
+            V::load(simd, &node.half[0]),
+            V::load(simd, &node.half[1]),
+            V::load(simd, &node.half[2]),
+        ],
     };
-    let [lo, hi] = lambda.map(|x| V::broadcast(simd, x));
+    let (lo, hi) = (V::broadcast(simd, lambda[0]), V::broadcast(simd, lambda[1]));
     let (lo, hi, meets) = volume.meets(test, &boxes, lo, hi);
     let (mut los, mut his) = ([0.0; CHILDREN], [0.0; CHILDREN]);
     lo.store(&mut los);

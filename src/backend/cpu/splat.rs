@@ -220,7 +220,8 @@ impl Projection<'_> {
         let height = V::broadcast(simd, (self.patch.rect.height() + BORDER) as f32);
         let (mut xs, mut ys, mut depths) = ([0.0; 16], [0.0; 16], [0.0; 16]);
         for batch in batches {
-            let [lo, hi] = batch.lambda.map(|l| V::broadcast(simd, l));
+            let lo = V::broadcast(simd, batch.lambda[0]);
+            let hi = V::broadcast(simd, batch.lambda[1]);
             let end = batch.first + batch.count;
             let mut at = batch.first;
             projections += u64::from(batch.count);
@@ -236,7 +237,7 @@ impl Projection<'_> {
                 ];
                 let mut seen = 0u64;
                 let mut taken = !active;
-                project(&self.camera.camera, q, lo, hi, |image| {
+                for image in project(&self.camera.camera, q, lo, hi).as_slice() {
                     let front = zero.lt(image.linear(self.camera.front)) & active;
                     let inside = image.within([EDGE_TOLERANCE; 3]) & front;
                     seen |= V::bits(inside);
@@ -246,18 +247,18 @@ impl Projection<'_> {
                         taken = taken | drawn;
                     }
                     if !V::any(drawn) {
-                        return;
+                        continue;
                     }
-                    let [x, y, lands] = self.place(&image, offset);
+                    let [x, y, lands] = self.place(image, offset);
                     let lands =
                         zero.lt(lands) & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
                     let mut bits = V::bits(drawn & lands);
                     if bits == 0 {
-                        return;
+                        continue;
                     }
                     x.store(&mut xs);
                     y.store(&mut ys);
-                    self.depth(&image).store(&mut depths);
+                    self.depth(image).store(&mut depths);
                     while bits != 0 {
                         let lane = bits.trailing_zeros();
                         bits &= bits - 1;
@@ -272,7 +273,7 @@ impl Projection<'_> {
                         let key = u64::from(depths[l].to_bits()) << 32 | u64::from(at + lane);
                         hits.push(Hit { key, slot });
                     }
-                });
+                }
                 valid += u64::from(seen.count_ones());
                 at += lanes;
             }
@@ -295,10 +296,15 @@ impl Projection<'_> {
     #[inline(always)]
     pub(crate) fn depth<R: Real<Scalar = f32>>(&self, image: &Image<R>) -> R {
         let camera = &self.camera.camera;
-        let d = [0, 1, 2].map(|k| image.b2 * camera.f1[k] + image.b3 * camera.f2[k] + camera.d1[k]);
+        let d = [
+            image.linear([camera.d1[0], camera.f1[0], camera.f2[0]]),
+            image.linear([camera.d1[1], camera.f1[1], camera.f2[1]]),
+            image.linear([camera.d1[2], camera.f1[2], camera.f2[2]]),
+        ];
         let mut depth = image.lambda * dot(d, d).sqrt();
         if self.pass.depth == DepthKey::PushBack {
-            let v = self.camera.from_eye.map(|form| image.linear(form));
+            let [x, y, z] = self.camera.from_eye;
+            let v = [image.linear(x), image.linear(y), image.linear(z)];
             depth = depth + dot(v, v).sqrt();
         }
         (depth * self.camera.scale).max(image.lambda.splat(0.0))

@@ -77,7 +77,9 @@ fn corner_has_image<R: Real>(
     let camera = super::ThreeRay::<R::Scalar>::new(&rays, &rays);
     let mut inside = far.lt(zero);
     let none = R::Scalar::from_f64(0.0);
-    super::project(&camera, q, zero, far, |image| inside = inside | image.within([none; 3]));
+    for image in super::project(&camera, q, zero, far).as_slice() {
+        inside = inside | image.within([none; 3]);
+    }
     inside
 }
 

@@ -27,11 +27,11 @@ impl<R: Real> Image<R> {
     /// Lanes in which all three weights are at least -margin_i.
     #[inline(always)]
     pub fn within(&self, margin: [R::Scalar; 3]) -> R::Mask {
-        let least = |m: R::Scalar| self.b2.splat(-m);
+        let [m1, m2, m3] = margin;
         self.found
-            & least(margin[0]).le(self.b1())
-            & least(margin[1]).le(self.b2)
-            & least(margin[2]).le(self.b3)
+            & self.b2.splat(-m1).le(self.b1())
+            & self.b2.splat(-m2).le(self.b2)
+            & self.b2.splat(-m3).le(self.b3)
     }
 
     /// form_1 + b2 form_2 + b3 form_3: a quantity that is linear over the triangle.
@@ -62,8 +62,9 @@ impl<T: Scalar> ThreeRay<T> {
             return (lo, hi);
         }
         let along = dot_const(q, self.axis);
-        let bound = |i: usize| (along - self.start[i]) * self.per_axis[i];
-        let (x, y, z) = (bound(0), bound(1), bound(2));
+        let x = (along - self.start[0]) * self.per_axis[0];
+        let y = (along - self.start[1]) * self.per_axis[1];
+        let z = (along - self.start[2]) * self.per_axis[2];
         // Outward by far more than the rounding of the bounds.
         let slack = (x.abs() + y.abs() + z.abs()) * T::from_f64(1e-5);
         ((x.min(y).min(z) - slack).max(lo), (x.max(y).max(z) + slack).min(hi))
@@ -72,10 +73,8 @@ impl<T: Scalar> ThreeRay<T> {
     /// The image at a root λ of the cubic of `q`.
     #[inline(always)]
     pub fn image_at<R: Real<Scalar = T>>(&self, q: [R; 3], lambda: R, found: R::Mask) -> Image<R> {
-        let along = |a: [T; 3], b: [T; 3]| {
-            [lambda * b[0] + a[0], lambda * b[1] + a[1], lambda * b[2] + a[2]]
-        };
-        let (e1, e2) = (along(self.e1, self.f1), along(self.e2, self.f2));
+        let e1 = along(self.e1, self.f1, lambda);
+        let e2 = along(self.e2, self.f2, lambda);
         let x =
             [q[0] - lambda * self.d1[0], q[1] - lambda * self.d1[1], q[2] - lambda * self.d1[2]];
         let n = cross(e1, e2);
@@ -94,17 +93,40 @@ impl<T: Scalar> ThreeRay<T> {
     }
 }
 
-/// All images of the points v1 + `q` with λ in `lo..=hi` that lie in the camera's grown triangle (others may
-/// be reported too): `found(image)` is called once or three times, with λ rising within a lane.
+/// a + λ b.
 #[inline(always)]
-pub fn project<R: Real>(
-    camera: &ThreeRay<R::Scalar>,
-    q: [R; 3],
-    lo: R,
-    hi: R,
-    mut found: impl FnMut(Image<R>),
-) {
+fn along<R: Real>(a: [R::Scalar; 3], b: [R::Scalar; 3], lambda: R) -> [R; 3] {
+    [lambda * b[0] + a[0], lambda * b[1] + a[1], lambda * b[2] + a[2]]
+}
+
+/// Up to three images a lane.
+#[derive(Clone, Copy)]
+pub struct Images<R: Real> {
+    image: [Image<R>; 3],
+    count: usize,
+}
+
+impl<R: Real> Images<R> {
+    /// The images, with λ rising within a lane: one or three, of which a lane has those that are `found`.
+    #[inline(always)]
+    pub fn as_slice(&self) -> &[Image<R>] {
+        &self.image[..self.count]
+    }
+}
+
+/// All images of the points v1 + `q` with λ in `lo..=hi` that lie in the camera's grown triangle (others may
+/// be reported too).
+#[inline(always)]
+pub fn project<R: Real>(camera: &ThreeRay<R::Scalar>, q: [R; 3], lo: R, hi: R) -> Images<R> {
     let (lo, hi) = camera.bracket(q, lo, hi);
-    let cubic = camera.cubic(q);
-    cubic.roots_between(lo, hi, |lambda, lanes| found(camera.image_at(q, lambda, lanes)));
+    let roots = camera.cubic(q).roots_between(lo, hi);
+    let (lambda, found) = roots.root[0];
+    let mut image = [camera.image_at(q, lambda, found); 3];
+    if roots.count > 1 {
+        for k in 1..3 {
+            let (lambda, found) = roots.root[k];
+            image[k] = camera.image_at(q, lambda, found);
+        }
+    }
+    Images { image, count: roots.count }
 }

@@ -53,13 +53,11 @@ impl<R: Real> Cubic<R> {
         let root = disc.max(zero).sqrt();
         let t = R::select(self.c[2].lt(zero), root - self.c[2], -(self.c[2] + root));
         let none = disc.lt(zero);
-        let safe = |num: R, den: R| {
-            let usable = zero.lt(den.abs());
-            let one = lo.splat(R::Scalar::from_f64(1.0));
-            let x = num / R::select(usable, den, one);
-            R::select(usable & !none, x, lo).max(lo).min(hi)
-        };
-        let (p, q) = (safe(t, a), safe(self.c[1], t));
+        let one = lo.splat(R::Scalar::from_f64(1.0));
+        let (has_p, has_q) = (zero.lt(a.abs()), zero.lt(t.abs()));
+        let p = R::select(has_p & !none, t / R::select(has_p, a, one), lo).max(lo).min(hi);
+        let q = self.c[1] / R::select(has_q, t, one);
+        let q = R::select(has_q & !none, q, lo).max(lo).min(hi);
         [p.min(q), p.max(q)]
     }
 
@@ -101,23 +99,29 @@ impl<R: Real> Cubic<R> {
         (x, exists)
     }
 
-    /// Calls `found(root, lanes)` for the real roots in `lo..=hi`, in rising order within a lane: once if
-    /// F is monotone there in all lanes, else three times.
+    /// The real roots in `lo..=hi`, in rising order within a lane: one if F is monotone there in all lanes,
+    /// else three. A lane has those that its mask says.
     #[inline(always)]
-    pub fn roots_between(&self, lo: R, hi: R, mut found: impl FnMut(R, R::Mask)) {
-        if R::any(self.bends(lo, hi)) {
-            let [p, q] = self.critical_points(lo, hi);
-            for (from, to, closed) in [(lo, p, true), (p, q, false), (q, hi, false)] {
-                let (x, exists) = self.monotone_root(from, to, closed);
-                if R::any(exists) {
-                    found(x, exists);
-                }
-            }
-        } else {
-            let (x, exists) = self.monotone_root(lo, hi, true);
-            if R::any(exists) {
-                found(x, exists);
-            }
+    pub fn roots_between(&self, lo: R, hi: R) -> Roots<R> {
+        if !R::any(self.bends(lo, hi)) {
+            let root = self.monotone_root(lo, hi, true);
+            return Roots { root: [root; 3], count: 1 };
         }
+        let [p, q] = self.critical_points(lo, hi);
+        let root = [
+            self.monotone_root(lo, p, true),
+            self.monotone_root(p, q, false),
+            self.monotone_root(q, hi, false),
+        ];
+        Roots { root, count: 3 }
     }
+}
+
+/// Up to three roots a lane.
+#[derive(Clone, Copy)]
+pub struct Roots<R: Real> {
+    /// Roots and the lanes that have them.
+    pub root: [(R, R::Mask); 3],
+    /// How many of them there can be.
+    pub count: usize,
 }

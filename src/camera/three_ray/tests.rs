@@ -64,11 +64,11 @@ fn images<T: Scalar + Real<Scalar = T, Mask = bool>>(
     let v1 = DVec3::from_array(camera.v1.map(Scalar::to_f64));
     let q: [T; 3] = array(point - v1);
     let mut list = Vec::new();
-    project(camera, q, T::from_f64(-1e-5), T::from_f64(hi), |image| {
+    for image in project(camera, q, T::from_f64(-1e-5), T::from_f64(hi)).as_slice() {
         if image.within([T::from_f64(1e-3); 3]) {
-            list.push(image);
+            list.push(*image);
         }
-    });
+    }
     list
 }
 
@@ -174,7 +174,7 @@ fn every_lane_width_gives_the_same_bits() {
         for at in (0..16).step_by(V::LANES) {
             let q = [0, 1, 2].map(|k| V::load(simd, &points[k][at..]));
             let (lo, hi) = (V::broadcast(simd, 0.0), V::broadcast(simd, 8.0));
-            project(camera, q, lo, hi, |image| {
+            for image in project(camera, q, lo, hi).as_slice() {
                 let (mut l, mut b, mut c) = ([0.0; 16], [0.0; 16], [0.0; 16]);
                 image.lambda.store(&mut l);
                 image.b2.store(&mut b);
@@ -214,7 +214,7 @@ fn every_lane_width_gives_the_same_bits() {
         let mut scalar = Vec::new();
         for i in 0..16 {
             let q = [0, 1, 2].map(|k| points[k][i]);
-            project(&camera, q, 0.0f32, 8.0, |image| {
+            for image in project(&camera, q, 0.0f32, 8.0).as_slice() {
                 if image.found {
                     #[expect(clippy::cast_possible_truncation)]
                     scalar.push([

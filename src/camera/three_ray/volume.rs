@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::{Rays, array};
-use crate::geometry::lanes::{Real, Scalar, cross, dot_const};
+use crate::geometry::lanes::{Real, Scalar, cross, dot, dot_const};
 
 /// How boxes are tested against a view volume.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -197,17 +197,14 @@ impl<T: Scalar> ViewVolume<T> {
         let (lo, hi) = self.axis.trim(boxes, lo, hi);
         let share = T::from_f64(ROUNDING);
         let mut alive = lo.le(hi);
-        let at = |k: usize, i: usize, lambda: R| lambda * self.d[i][k] + self.v[i][k];
-        let near: [[R; 3]; 3] = [0, 1, 2].map(|i| [0, 1, 2].map(|k| at(k, i, lo)));
-        let far: [[R; 3]; 3] = [0, 1, 2].map(|i| [0, 1, 2].map(|k| at(k, i, hi)));
+        let near = [self.corner(0, lo), self.corner(1, lo), self.corner(2, lo)];
+        let far = [self.corner(0, hi), self.corner(1, hi), self.corner(2, hi)];
         let mut size = lo.splat(T::from_f64(0.0));
         for k in 0..3 {
-            let low = [near[1][k], near[2][k], far[0][k], far[1][k], far[2][k]]
-                .into_iter()
-                .fold(near[0][k], R::min);
-            let high = [near[1][k], near[2][k], far[0][k], far[1][k], far[2][k]]
-                .into_iter()
-                .fold(near[0][k], R::max);
+            let low = near[0][k].min(near[1][k]).min(near[2][k]);
+            let low = low.min(far[0][k]).min(far[1][k]).min(far[2][k]);
+            let high = near[0][k].max(near[1][k]).max(near[2][k]);
+            let high = high.max(far[0][k]).max(far[1][k]).max(far[2][k]);
             let (c, h) = (boxes.center[k], boxes.half[k]);
             let margin = (c.abs() + h + low.abs().max(high.abs())) * share;
             size = size + margin;
@@ -217,28 +214,39 @@ impl<T: Scalar> ViewVolume<T> {
             return (lo, hi, alive);
         }
         let mid = (lo + hi) * T::from_f64(0.5);
-        for (i, j, other) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
-            let edge = [0, 1, 2].map(|k| at(k, j, mid) - at(k, i, mid));
-            let along = [0, 1, 2].map(|k| mid.splat(self.d[i][k] + self.d[j][k]));
+        let at_mid = [self.corner(0, mid), self.corner(1, mid), self.corner(2, mid)];
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let along = [
+                mid.splat(self.d[i][0] + self.d[j][0]),
+                mid.splat(self.d[i][1] + self.d[j][1]),
+                mid.splat(self.d[i][2] + self.d[j][2]),
+            ];
+            let edge = [
+                at_mid[j][0] - at_mid[i][0],
+                at_mid[j][1] - at_mid[i][1],
+                at_mid[j][2] - at_mid[i][2],
+            ];
             let n = cross(edge, along);
-            let reach = |p: &[R; 3]| p[0] * n[0] + p[1] * n[1] + p[2] * n[2];
-            let on_edge =
-                reach(&near[i]).max(reach(&far[i])).max(reach(&near[j]).max(reach(&far[j])));
-            let low_edge =
-                reach(&near[i]).min(reach(&far[i])).min(reach(&near[j]).min(reach(&far[j])));
-            let (r_near, r_far) = (reach(&near[other]), reach(&far[other]));
-            let high = on_edge.max(r_near.max(r_far));
-            let low = low_edge.min(r_near.min(r_far));
+            let p = [dot(near[0], n), dot(near[1], n), dot(near[2], n)];
+            let q = [dot(far[0], n), dot(far[1], n), dot(far[2], n)];
+            let high = p[0].max(p[1]).max(p[2]).max(q[0]).max(q[1]).max(q[2]);
+            let low = p[0].min(p[1]).min(p[2]).min(q[0]).min(q[1]).min(q[2]);
             let sizes = [n[0].abs(), n[1].abs(), n[2].abs()];
-            let half =
-                boxes.half[0] * sizes[0] + boxes.half[1] * sizes[1] + boxes.half[2] * sizes[2];
+            let half = dot(boxes.half, sizes);
             // Every term is at most `size / share` times the normal's largest component.
             let margin = size * (sizes[0] + sizes[1] + sizes[2]) * T::from_f64(4.0);
-            let middle = reach(&boxes.center);
+            let middle = dot(boxes.center, n);
             // Refused only where the comparison holds: a NaN from an overflow refuses nothing.
             let outside = (high + margin).lt(middle - half) | (middle + half).lt(low - margin);
             alive = alive & !outside;
         }
         (lo, hi, alive)
+    }
+
+    /// v_i + λ d_i.
+    #[inline(always)]
+    fn corner<R: Real<Scalar = T>>(&self, i: usize, lambda: R) -> [R; 3] {
+        let (v, d) = (self.v[i], self.d[i]);
+        [lambda * d[0] + v[0], lambda * d[1] + v[1], lambda * d[2] + v[2]]
     }
 }

@@ -194,11 +194,12 @@ fn screen_forms(eye: &Eye, patch: &Patch, corners: [DVec3; 3]) -> [[f32; 3]; 3] 
     ]
 }
 
-/// How far a splat's centre may lie outside the triangle and still cover one of its pixels, as weights.
+/// How far a splat's centre may lie outside the triangle and still cover one of its pixels, as weights: the
+/// footprint about a pixel's centre, seen along each edge's normal.
 fn guard(eye: &Eye, corners: [DVec3; 3], shape: SplatShape) -> DVec3 {
     let reach_px = match shape {
-        SplatShape::Square1 => 0.5 + 0.5,
-        SplatShape::Square2 => 1.0 + 0.5,
+        SplatShape::Square1 => 0.5,
+        SplatShape::Square2 => 1.0,
     };
     let h = corners.map(|v| homogeneous(eye, v));
     if h.iter().any(|h| h.z <= 0.0) {
@@ -207,8 +208,9 @@ fn guard(eye: &Eye, corners: [DVec3; 3], shape: SplatShape) -> DVec3 {
     let s = h.map(|h| h.truncate() / h.z);
     let area = (s[1] - s[0]).perp_dot(s[2] - s[0]).abs();
     let of = |i: usize| {
-        let edge = (s[(i + 2) % 3] - s[(i + 1) % 3]).length();
-        (reach_px * edge / area.max(f64::MIN_POSITIVE)).min(MAX_GUARD)
+        // A square's support in the direction of the edge's normal, by the edge's length.
+        let edge = (s[(i + 2) % 3] - s[(i + 1) % 3]).abs();
+        (reach_px * (edge.x + edge.y) / area.max(f64::MIN_POSITIVE)).min(MAX_GUARD)
     };
     DVec3::new(of(0), of(1), of(2))
 }
