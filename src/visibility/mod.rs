@@ -1,12 +1,14 @@
 //! What the eye sees directly: which surface triangle each sample of each pixel shows. Made once a frame
 //! on the CPU and used by every method and backend.
 //!
-//! The data flow: [`project`] moves the corners onto a fixed-point picture plane and clips the triangles
-//! that leave it, [`raster`] sorts them into tiles and decides every sample, [`weights`] says where on a
-//! triangle a view ray meets it.
+//! The data flow, led by `raster`: `project` moves the corners onto a fixed-point picture plane and clips the
+//! triangles that leave it, `tiles` sorts them, `fill` decides the samples. Apart from that, `weights` says
+//! where on a triangle a view ray meets it.
 
+mod fill;
 mod project;
 mod raster;
+mod tiles;
 mod weights;
 
 use glam::Vec3;
@@ -16,7 +18,6 @@ use crate::camera::eye::ImageSize;
 
 pub use project::MAX_SIDE;
 pub use raster::Scratch;
-pub(crate) use weights::view_ray;
 pub use weights::{RayWeights, barycentrics};
 
 /// Marks a sample that shows no triangle.

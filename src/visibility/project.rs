@@ -11,6 +11,9 @@ use crate::camera::Eye;
 /// Fractional bits of picture coordinates: a corner moves by at most 2.5e-4 px in x and in y.
 pub(super) const SUBPIXEL_BITS: u32 = 11;
 
+/// Fractional bits of an eighth of a pixel, the unit of sample positions.
+pub(super) const EIGHTH_BITS: u32 = SUBPIXEL_BITS - 3;
+
 /// Picture sides up to this many pixels are covered.
 pub const MAX_SIDE: u32 = 1 << 15;
 
@@ -69,8 +72,10 @@ impl Projection {
     #[inline(always)]
     pub(super) fn corner(&self, point: Vec3) -> Corner {
         let h = self.homogeneous(point);
-        let outside = (0..PLANES)
-            .fold(0, |bits, plane| bits | u32::from(!(self.inside_by(plane, h) >= 0.0)) << plane);
+        // Not "below zero": what is not a number is outside as well.
+        let outside = (0..PLANES).fold((1 << PLANES) - 1, |bits, plane| {
+            bits ^ u32::from(self.inside_by(plane, h) >= 0.0) << plane
+        });
         if outside == 0 { self.snapped(h) } else { Corner { outside, ..Corner::default() } }
     }
 

@@ -31,7 +31,7 @@ impl Soup {
     fn new(corners: impl IntoIterator<Item = [Vec3; 3]>) -> Self {
         let positions: Vec<Vec3> = corners.into_iter().flatten().collect();
         let triangles =
-            (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+            (0..).zip(positions.chunks(3)).map(|(t, _)| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
         Self { positions, triangles }
     }
 
@@ -262,8 +262,10 @@ fn equal_depth_goes_to_the_lower_id_and_nan_nowhere() {
     let eye = eye([0.0, 0.0, 1.0], [0.0; 3], 300, 200);
     let big = [vec3(-9.0, -9.0, 0.0), vec3(9.0, -9.0, 0.0), vec3(0.0, 9.0, 0.0)];
     let small = big.map(|p| p * 0.002);
-    let broken = [vec3(f32::NAN, 0.0, 0.5), vec3(1.0, 0.0, 0.5), vec3(0.0, f32::INFINITY, 0.5)];
-    let soup = Soup::new([broken, small, big, big, small]);
+    // Near the eye: if they were drawn, they would be seen.
+    let broken = [vec3(f32::NAN, 0.0, 0.5), vec3(1.0, 0.0, 0.5), vec3(0.0, 1.0, 0.5)];
+    let endless = [vec3(f32::INFINITY, 0.0, 0.5), vec3(-1.0, -1.0, 0.5), vec3(0.0, 1.0, 0.5)];
+    let soup = Soup::new([broken, small, big, big, small, endless]);
     let visibility = seen(&eye, &[], &[soup.mesh()]);
     let ids: Vec<u32> = visibility.samples.iter().flatten().copied().collect();
     assert!(ids.iter().all(|&id| id == 1 || id == 2));

@@ -7,45 +7,51 @@ use crate::camera::Eye;
 /// Finds the barycentric weights of a triangle's plane along view rays: made once a triangle, asked for
 /// every ray.
 ///
-/// With the corners c relative to the eye, the weights of direction d are proportional to
-/// (c₁×c₂)·d, (c₂×c₀)·d and (c₀×c₁)·d.
+/// With the corners c in homogeneous picture coordinates, the weights at picture position p = (x, y, 1) are
+/// proportional to (c₁×c₂)·p, (c₂×c₀)·p and (c₀×c₁)·p (Olano and Greer 1997, section 3).
 #[derive(Clone, Copy, Debug)]
 pub struct RayWeights {
     rows: [DVec3; 3],
-    /// Six times the signed volume of the tetrahedron that the triangle spans with the eye.
+    /// The determinant of the corners; divided by the sum of the above it is the depth.
     volume: f64,
+    middle: DVec2,
 }
 
 impl RayWeights {
     /// For the triangle with these corners (scene space).
     pub fn new(eye: &Eye, corners: [Vec3; 3]) -> Self {
-        let c = corners.map(|p| p.as_dvec3() - eye.position.as_dvec3());
-        let rows = [c[1].cross(c[2]), c[2].cross(c[0]), c[0].cross(c[1])];
-        Self { rows, volume: rows[0].dot(c[0]) }
+        let focal = f64::from(eye.focal_px);
+        let [a, b, c] = corners.map(|corner| {
+            let p = corner.as_dvec3() - eye.position.as_dvec3();
+            let along = |axis: Vec3| p.dot(axis.as_dvec3());
+            DVec3::new(focal * along(eye.right), -focal * along(eye.up), along(eye.forward))
+        });
+        let rows = [b.cross(c), c.cross(a), a.cross(b)];
+        Self { rows, volume: rows[0].dot(a), middle: middle_px(eye) }
     }
 
-    /// The weights where the ray from the eye in `direction` (any length) meets the triangle's plane.
-    /// They sum to 1; outside the triangle some are negative. `None` where it does not meet it in front
-    /// of the eye.
+    /// The weights where the view ray through a picture position meets the triangle's plane. They sum to
+    /// 1; outside the triangle some are negative. `None` where it does not meet it in front of the eye.
+    #[inline]
     #[expect(clippy::cast_possible_truncation, reason = "weights are f32 everywhere")]
-    pub fn at(&self, direction: DVec3) -> Option<[f32; 3]> {
-        let share = self.rows.map(|row| row.dot(direction));
+    pub fn at(&self, px: DVec2) -> Option<[f32; 3]> {
+        let p = (px - self.middle).extend(1.0);
+        let share = [self.rows[0].dot(p), self.rows[1].dot(p), self.rows[2].dot(p)];
         let sum = share[0] + share[1] + share[2];
+        let scale = 1.0 / sum;
+        let weights = [share[0] * scale, share[1] * scale, share[2] * scale].map(|w| w as f32);
         let in_front = sum * self.volume > 0.0;
-        let weights = share.map(|w| (w / sum) as f32);
-        (in_front && weights.iter().all(|w| w.is_finite())).then_some(weights)
+        let finite = weights[0].abs().max(weights[1].abs()).max(weights[2].abs()) < f32::INFINITY;
+        (in_front && finite).then_some(weights)
     }
 }
 
 /// The weights of `corners` (scene space) where the view ray through a picture position meets their
 /// plane: see [`RayWeights::at`].
 pub fn barycentrics(eye: &Eye, corners: [Vec3; 3], px: Vec2) -> Option<[f32; 3]> {
-    RayWeights::new(eye, corners).at(view_ray(eye, px.as_dvec2()))
+    RayWeights::new(eye, corners).at(px.as_dvec2())
 }
 
-/// [`Eye::ray_through_px`] in f64.
-pub(crate) fn view_ray(eye: &Eye, px: DVec2) -> DVec3 {
-    let middle = DVec2::new(f64::from(eye.size.width), f64::from(eye.size.height)) * 0.5;
-    let slope = (px - middle) / f64::from(eye.focal_px);
-    eye.forward.as_dvec3() + eye.right.as_dvec3() * slope.x - eye.up.as_dvec3() * slope.y
+fn middle_px(eye: &Eye) -> DVec2 {
+    DVec2::new(f64::from(eye.size.width), f64::from(eye.size.height)) * 0.5
 }

@@ -4,13 +4,11 @@
 //! *before* that: next to something brighter than white, an edge would otherwise be as jagged as without
 //! antialiasing, since a fifth of the pixel would already turn all of it white.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
 use crate::camera::Eye;
-use crate::visibility::{
-    NONE_ID, RayWeights, SAMPLE_EIGHTHS, SAMPLES, SurfaceMesh, Visibility, view_ray,
-};
+use crate::visibility::{RayWeights, SAMPLE_EIGHTHS, SAMPLES, SurfaceMesh, Visibility};
 
 /// A point of an object that the eye sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,65 +71,98 @@ pub fn compose(view: &DirectView, appearance: &impl Appearance, out: &mut [Vec3]
     assert_eq!((view.reflection.len(), out.len()), (pixels, pixels), "planes of one size");
     let width = view.visibility.size.width as usize;
     out.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
-        let mut row_of_pixels = Row { view, appearance, last: None };
+        let mut painter = Painter { view, appearance, last: None };
         for (x, pixel) in row.iter_mut().enumerate() {
-            *pixel = row_of_pixels.pixel(x, y);
+            *pixel = painter.pixel(x, y);
         }
     });
 }
 
 /// What one sample shows.
-#[derive(Clone, Copy)]
-enum Seen {
-    Sky,
-    Surface { surface: usize, triangle: usize, id: u32 },
-}
-
-impl Seen {
-    /// Index of the surface; samples with equal ones are shaded together.
-    fn surface(self) -> Option<usize> {
-        match self {
-            Self::Sky => None,
-            Self::Surface { surface, .. } => Some(surface),
-        }
-    }
-}
-
-/// The samples of a pixel that show one surface.
-#[derive(Clone, Copy)]
-struct Group<'a> {
-    pixel: [usize; 2],
-    seen: &'a [Seen; SAMPLES],
+#[derive(Clone, Copy, PartialEq)]
+struct Seen {
+    /// `None` for the sky.
     surface: Option<usize>,
+    triangle: usize,
+    id: u32,
 }
 
-impl Group<'_> {
-    fn members(&self) -> impl Iterator<Item = usize> {
-        (0..SAMPLES).filter(|&s| self.seen[s].surface() == self.surface)
-    }
-
-    fn position_px(&self, sample: usize) -> DVec2 {
-        let [x, y] = SAMPLE_EIGHTHS[sample].map(|e| f64::from(e) / 8.0);
-        DVec2::new(self.pixel[0] as f64 + x, self.pixel[1] as f64 + y)
-    }
-
-    /// Mean position of the members, px.
-    fn middle_px(&self) -> DVec2 {
-        let sum: DVec2 = self.members().map(|s| self.position_px(s)).sum();
-        sum / self.members().count() as f64
-    }
-}
-
-/// Triangles of one surface, to look up an id without a search.
+/// The samples of a pixel that show one surface: one bit each.
 #[derive(Clone, Copy)]
-struct Row<'a, A> {
+struct Group(usize);
+
+/// For each [`Group`]: the mean position of its samples in the pixel (px), and the sample nearest to it.
+const MIDDLES: [([f64; 2], usize); 1 << SAMPLES] = {
+    let mut middles = [([0.0; 2], 0); 1 << SAMPLES];
+    let mut group = 1;
+    while group < middles.len() {
+        // The mean is in units of 1 / count of an eighth, to stay in integers.
+        let (mut x, mut y, mut count) = (0_i32, 0_i32, 0_i32);
+        let mut s = 0;
+        while s < SAMPLES {
+            if group >> s & 1 == 1 {
+                x += SAMPLE_EIGHTHS[s][0] as i32;
+                y += SAMPLE_EIGHTHS[s][1] as i32;
+                count += 1;
+            }
+            s += 1;
+        }
+        let (mut nearest, mut least) = (0, i32::MAX);
+        s = 0;
+        while s < SAMPLES {
+            let dx = SAMPLE_EIGHTHS[s][0] as i32 * count - x;
+            let dy = SAMPLE_EIGHTHS[s][1] as i32 * count - y;
+            if group >> s & 1 == 1 && dx * dx + dy * dy < least {
+                (nearest, least) = (s, dx * dx + dy * dy);
+            }
+            s += 1;
+        }
+        let unit = 8.0 * count as f64;
+        middles[group] = ([x as f64 / unit, y as f64 / unit], nearest);
+        group += 1;
+    }
+    middles
+};
+
+impl Group {
+    fn of(seen: &[Seen; SAMPLES], surface: Option<usize>) -> Self {
+        Self((0..SAMPLES).fold(0, |bits, s| bits | usize::from(seen[s].surface == surface) << s))
+    }
+
+    fn members(self) -> impl Iterator<Item = usize> {
+        (0..SAMPLES).filter(move |s| self.0 >> s & 1 == 1)
+    }
+
+    fn count(self) -> f32 {
+        self.0.count_ones() as f32
+    }
+
+    /// Mean position of its samples of a pixel, px.
+    fn middle_px(self, pixel: [usize; 2]) -> DVec2 {
+        DVec2::from(MIDDLES[self.0].0) + DVec2::new(pixel[0] as f64, pixel[1] as f64)
+    }
+
+    /// The sample nearest to that.
+    fn middle_sample(self) -> usize {
+        MIDDLES[self.0].1
+    }
+}
+
+/// Computes pixels one after the other.
+struct Painter<'a, A> {
     view: &'a DirectView<'a>,
     appearance: &'a A,
-    /// The triangle met last: neighbouring samples mostly meet the same.
-    last: Option<(u32, [Vec3; 3], RayWeights)>,
+    /// The object triangle met last: neighbouring samples mostly meet the same.
+    last: Option<Met>,
 }
 
-impl<A: Appearance> Row<'_, A> {
+struct Met {
+    id: u32,
+    corners: [Vec3; 3],
+    rays: RayWeights,
+}
+
+impl<A: Appearance> Painter<'_, A> {
     fn pixel(&mut self, x: usize, y: usize) -> Vec3 {
         let visibility = self.view.visibility;
         let at = y * visibility.size.width as usize + x;
@@ -140,125 +171,128 @@ impl<A: Appearance> Row<'_, A> {
         if same && ids[0] < visibility.mirror_triangles() {
             return self.displayed(self.view.reflection[at]);
         }
-        let first = self.seen(ids[0]);
-        let seen = if same { [first; SAMPLES] } else { ids.map(|id| self.seen(id)) };
+        let center = self.seen(ids[0]);
+        let seen = if same { [center; SAMPLES] } else { ids.map(|id| self.seen(id)) };
         let mut sum = Vec3::ZERO;
-        for sample in 0..SAMPLES {
-            let surface = seen[sample].surface();
-            if seen[..sample].iter().any(|before| before.surface() == surface) {
+        let mut done = 0;
+        for (sample, Seen { surface, triangle, .. }) in seen.into_iter().enumerate() {
+            if done >> sample & 1 == 1 {
                 continue;
             }
-            let group = Group { pixel: [x, y], seen: &seen, surface };
-            let count = group.members().count() as f32;
-            sum += match seen[sample] {
-                Seen::Sky => self.displayed(self.sky(group.middle_px())) * count,
-                Seen::Surface { surface, triangle, id } if surface < visibility.mirrors() => {
-                    let corners = self.view.mirrors[surface].corners(triangle);
-                    let own = (ids[0] == id || first.surface() == Some(surface)).then_some(at);
-                    self.mirror(&group, surface, own, corners) * count
+            let group = Group::of(&seen, surface);
+            done |= group.0;
+            sum += match surface {
+                None => self.sky(group.middle_px([x, y])) * group.count(),
+                Some(mirror) if mirror < visibility.mirrors() => {
+                    let value = if center.surface == surface {
+                        self.displayed(self.view.reflection[at])
+                    } else if let Some(borrowed) = self.neighbours([x, y], mirror) {
+                        borrowed
+                    } else {
+                        self.reflected_sky(group.middle_px([x, y]), mirror, triangle)
+                    };
+                    value * group.count()
                 }
-                Seen::Surface { surface, .. } => {
-                    self.object(&group, surface - visibility.mirrors())
-                }
+                Some(surface) => self.object([x, y], &seen, group, surface - visibility.mirrors()),
             };
         }
         sum / SAMPLES as f32
     }
 
     fn seen(&self, id: u32) -> Seen {
-        match self.view.visibility.locate(id) {
-            Some((surface, triangle)) => Seen::Surface { surface, triangle, id },
-            None => Seen::Sky,
-        }
+        let (surface, triangle) = self.view.visibility.locate(id).unzip();
+        Seen { surface, triangle: triangle.unwrap_or(0), id }
     }
 
     fn displayed(&self, radiance: Vec3) -> Vec3 {
         radiance.clamp(Vec3::ZERO, Vec3::splat(self.view.white))
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "directions are f32")]
-    fn sky(&self, px: DVec2) -> Vec3 {
-        let direction = view_ray(self.view.eye, px).as_vec3();
-        self.appearance.sky(direction.normalize_or(self.view.eye.forward))
+    /// The unit direction of the view ray.
+    fn direction(&self, px: DVec2) -> Vec3 {
+        self.view.eye.ray_through_px(px.as_vec2()).normalize_or(self.view.eye.forward)
     }
 
-    /// One sample's share of a mirror.
-    fn mirror(&self, group: &Group, mirror: usize, own: Option<usize>, corners: [Vec3; 3]) -> Vec3 {
-        if let Some(at) = own {
-            return self.displayed(self.view.reflection[at]);
-        }
+    fn sky(&self, px: DVec2) -> Vec3 {
+        self.displayed(self.appearance.sky(self.direction(px)))
+    }
+
+    /// The mean of the reflections at those of the neighbouring pixels that show the mirror at their
+    /// centres.
+    fn neighbours(&self, [x, y]: [usize; 2], mirror: usize) -> Option<Vec3> {
         let visibility = self.view.visibility;
         let (width, height) = (visibility.size.width as usize, visibility.size.height as usize);
-        let [x, y] = group.pixel;
         let (mut sum, mut count) = (Vec3::ZERO, 0.0);
         for row in y.saturating_sub(1)..(y + 2).min(height) {
-            for column in x.saturating_sub(1)..(x + 2).min(width) {
-                let at = row * width + column;
+            for at in row * width + x.saturating_sub(1)..row * width + (x + 2).min(width) {
                 if visibility.ids(mirror).contains(&visibility.mirror_ids[at]) {
                     sum += self.displayed(self.view.reflection[at]);
                     count += 1.0;
                 }
             }
         }
-        if count > 0.0 {
-            return sum / count;
-        }
-        let direction = view_ray(self.view.eye, group.middle_px()).normalize_or(DVec3::ZERO);
-        let [a, b, c] = corners.map(|p| p.as_dvec3());
-        let normal = (b - a).cross(c - a).normalize_or(-direction);
-        let reflected = (direction - 2.0 * direction.dot(normal) * normal).as_vec3();
+        (count > 0.0).then(|| sum / count)
+    }
+
+    /// What the flat triangle would reflect if there were nothing but sky.
+    fn reflected_sky(&self, px: DVec2, mirror: usize, triangle: usize) -> Vec3 {
+        let direction = self.direction(px);
+        let [a, b, c] = self.view.mirrors[mirror].corners(triangle);
+        // Relative to their size, since products of small f32 lengths underflow.
+        let [ab, ac] = [b - a, c - a].map(|side| side.normalize_or_zero());
+        let normal = ab.cross(ac).normalize_or(-direction);
+        let reflected = direction.reflect(normal);
         self.displayed(self.appearance.sky(reflected) * self.appearance.tint(mirror))
     }
 
     /// The sum of a group's samples on an object.
-    fn object(&mut self, group: &Group, object: usize) -> Vec3 {
-        let middle = group.middle_px();
-        let distance = |s: usize| group.position_px(s).distance_squared(middle);
-        let nearest = group.members().min_by(|&s, &t| distance(s).total_cmp(&distance(t)));
-        let Some(nearest) = nearest else { return Vec3::ZERO };
-        let lit = self.hit(group.seen[nearest], object, middle);
+    fn object(
+        &mut self,
+        pixel: [usize; 2],
+        seen: &[Seen; SAMPLES],
+        group: Group,
+        object: usize,
+    ) -> Vec3 {
+        let lit = self.hit(seen[group.middle_sample()], object, group.middle_px(pixel));
         let light = self.appearance.light(&lit);
         let mut sum = Vec3::ZERO;
         for sample in group.members() {
-            let hit = self.hit(group.seen[sample], object, group.position_px(sample));
+            let px = Group(1 << sample).middle_px(pixel);
+            let hit = self.hit(seen[sample], object, px);
             sum += self.displayed(self.appearance.albedo(&hit) * light);
         }
         sum
     }
 
-    /// Where the view ray through `px` meets the triangle; its nearest point by weights where the ray
-    /// passes it, which it does by less than a pixel.
-    fn hit(&mut self, seen: Seen, object: usize, px: DVec2) -> Hit {
-        let (triangle, id) = match seen {
-            Seen::Surface { triangle, id, .. } => (triangle, id),
-            Seen::Sky => (0, NONE_ID),
-        };
+    /// Where the view ray through `px` meets the triangle. Where the ray passes it, which it does by less
+    /// than a pixel, its negative weights are taken for zero.
+    fn hit(&mut self, Seen { triangle, id, .. }: Seen, object: usize, px: DVec2) -> Hit {
         let view = self.view;
-        let (_, corners, rays) = match self.last {
-            Some(last) if last.0 == id => last,
+        let met = match &self.last {
+            Some(last) if last.id == id => last,
             _ => {
                 let corners = view.objects[object].corners(triangle);
-                let made = (id, corners, RayWeights::new(view.eye, corners));
-                self.last = Some(made);
-                made
+                self.last.insert(Met { id, corners, rays: RayWeights::new(view.eye, corners) })
             }
         };
-        let weights = rays.at(view_ray(view.eye, px)).unwrap_or([1.0 / 3.0; 3]);
-        let weights = weights.map(|w| w.max(0.0));
-        let sum = weights[0] + weights[1] + weights[2];
-        let weights = weights.map(|w| w / sum);
-        let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+        let mut weights = met.rays.at(px).unwrap_or([1.0 / 3.0; 3]);
+        if weights[0].min(weights[1]).min(weights[2]) < 0.0 {
+            let inside = weights.map(|w| w.max(0.0));
+            weights = inside.map(|w| w / (inside[0] + inside[1] + inside[2]));
+        }
+        let point =
+            met.corners[0] * weights[0] + met.corners[1] * weights[1] + met.corners[2] * weights[2];
         Hit { object, triangle, weights, point }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{Vec2, vec2, vec3};
+    use glam::{DVec3, Vec2, vec2, vec3};
 
     use super::*;
     use crate::camera::eye::ImageSize;
-    use crate::visibility::Scratch;
+    use crate::visibility::{NONE_ID, Scratch};
 
     const SIZE: ImageSize = ImageSize { width: 24, height: 16 };
     const SUN: f32 = 50.0;
@@ -277,7 +311,7 @@ mod tests {
             direction.max(Vec3::ZERO)
         }
         fn tint(&self, _: usize) -> Vec3 {
-            vec3(0.5, 1.0, 1.0)
+            vec3(0.5, 0.25, 0.125)
         }
     }
 
@@ -384,7 +418,7 @@ mod tests {
         let px = vec2(5.375, 5.125);
         let view = eye().ray_through_px(px).normalize_or(Vec3::ZERO);
         let normal = (tilted[1] - tilted[0]).cross(tilted[2] - tilted[0]).normalize_or(Vec3::ZERO);
-        let mirrored = Plain.sky(view.reflect(normal)) * vec3(0.5, 1.0, 1.0);
+        let mirrored = Plain.sky(view.reflect(normal)) * vec3(0.5, 0.25, 0.125);
         assert!(mirrored.z > 0.1 || mirrored.y > 0.1 || mirrored.x > 0.1);
         let others = [vec2(4.0, 4.0), vec2(7.0, 3.0), vec2(5.0, 7.0), vec2(1.0, 5.0)];
         let middle = others.iter().sum::<Vec2>() / 32.0;
