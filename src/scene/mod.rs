@@ -1,3 +1,4 @@
 //! What is to be rendered: read, made or given, then sampled, shaded and sorted into trees.
 
 pub mod description;
+pub mod sample;
