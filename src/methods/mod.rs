@@ -1,0 +1,3 @@
+//! The ways to render a reflection.
+
+pub mod ray_traced;

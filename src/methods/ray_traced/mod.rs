@@ -1,0 +1,3 @@
+//! The ray-traced reference: one reflected ray a sample.
+
+pub mod trace;
