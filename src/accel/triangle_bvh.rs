@@ -1,10 +1,9 @@
 //! Rays against triangles: an eight-wide compressed tree (Ylitie, Karras & Laine 2017) of the `obvhs` crate,
 //! built by locally ordered clustering (Meister & Bittner 2018) with reinsertion and split large triangles.
 //!
-//! Measured choices, on a scan of 871,414 triangles and in a room of 1.7 M (reflected rays in tile order, two
-//! cores): this layout with three triangles a leaf and its traversal compiled for AVX2 or better equals the
-//! crate's binary tree on the scan and beats it by a third in the room; without AVX2 the two are within a
-//! tenth. Reinserting more than a twentieth of the nodes costs seconds and gains less than the noise.
+//! Measured on reflected rays in tile order: with its traversal compiled for AVX2 or better this layout is as fast as
+//! the crate's binary tree on a scan of 871,414 triangles and needs two thirds of its time in a room of 1.7 M.
+//! Reinserting four times as many nodes doubles the time to build and gains less than a tenth.
 
 use fearless_simd::{Level, dispatch};
 use glam::{UVec2, Vec3, Vec3A};
@@ -18,8 +17,8 @@ use rayon::prelude::*;
 
 use crate::geometry::Aabb;
 
-/// Rays a task: enough to amortise a task, few enough to keep all cores busy to the end (256 to 4,096
-/// measured alike).
+/// Rays a task: enough to amortise a task, few enough to keep all cores busy to the end. From 64 to 16,384 no
+/// difference was measured.
 pub const CHUNK: usize = 1024;
 
 /// Part of a ray, `origin + t·direction` for t in `[t_min, t_max]`; nothing if that is empty.
@@ -58,6 +57,15 @@ pub struct Hit {
     pub barycentrics: [f32; 3],
 }
 
+/// A triangle in the way of a ray.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Obstacle {
+    /// In lengths of the ray's direction.
+    pub(crate) t: f32,
+    /// Scene space, rounded.
+    pub(crate) corners: [Vec3; 3],
+}
+
 /// A tree over triangles in scene space. Both sides of a triangle are hit; degenerate ones never are.
 ///
 /// Of triangles met at the same t the lowest index counts, so that results do not depend on the tree.
@@ -71,7 +79,12 @@ pub struct TriangleBvh {
     /// no box that a ray leaves before a distance of 1e-4.
     scale: f32,
     bounds: Aabb,
+    /// `bounds` in tree units, grown beyond rounding: most rays of a picture meet nothing at all.
+    root: obvhs::aabb::Aabb,
 }
+
+/// Growth of the root's box in units of the largest coordinate: some roundings of f32.
+const ROOT_MARGIN: f32 = 1e-6;
 
 /// Width of the tree in its own units, as a power of two.
 const WIDTH_EXPONENT: i32 = 10;
@@ -99,8 +112,14 @@ impl TriangleBvh {
             .collect();
         let bounds = Aabb::of(kept.iter().flat_map(|&i| triangles[i as usize]));
         if kept.is_empty() {
-            let (tree, scale) = (CwBvh::default(), 1.0);
-            return Self { tree, triangles: Vec::new(), ids: Vec::new(), scale, bounds };
+            return Self {
+                tree: CwBvh::default(),
+                triangles: Vec::new(),
+                ids: Vec::new(),
+                scale: 1.0,
+                bounds,
+                root: obvhs::aabb::Aabb::empty(),
+            };
         }
         let octave = f64::from(bounds.extent().max_element()).log2().ceil() as i32;
         let scale = 2f64.powi((WIDTH_EXPONENT - octave).clamp(-100, 100)) as f32;
@@ -115,7 +134,12 @@ impl TriangleBvh {
         let order = &tree.primitive_indices;
         let in_order = order.par_iter().map(|&i| RtTriangle::from(&scaled[i as usize])).collect();
         let ids = order.par_iter().map(|&i| kept[i as usize]).collect();
-        Self { tree, triangles: in_order, ids, scale, bounds }
+        let margin = (bounds.min.abs().max(bounds.max.abs()).max_element() * scale) * ROOT_MARGIN;
+        let root = obvhs::aabb::Aabb::new(
+            (bounds.min * scale - margin).into(),
+            (bounds.max * scale + margin).into(),
+        );
+        Self { tree, triangles: in_order, ids, scale, bounds, root }
     }
 
     /// Tight box of the triangles, scene space; empty if there are none.
@@ -128,20 +152,13 @@ impl TriangleBvh {
         self.find_closest(&Ray { origin, direction, t_min, t_max }).map(|(hit, _)| hit)
     }
 
-    /// [`Self::closest`], and the corners of the triangle in scene space (rounded).
-    pub fn closest_with_corners(&self, ray: &Ray) -> Option<(Hit, [Vec3; 3])> {
-        let (hit, slot) = self.find_closest(ray)?;
-        let RtTriangle { v0, e1, e2, .. } = self.triangles[slot];
-        Some((hit, [v0, v0 - e1, v0 + e2].map(|p| Vec3::from(p) / self.scale)))
-    }
-
     /// Whether a ray meets any triangle: see [`Ray`] for the arguments.
     pub fn occluded(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> bool {
-        self.find_any(&Ray { origin, direction, t_min, t_max })
+        self.find_any(&Ray { origin, direction, t_min, t_max }).is_some()
     }
 
     /// The nearest hit of each ray. Neighbours in the slice should be neighbours in space (tiles of a picture,
-    /// leaves of a tree): that is worth a factor of two.
+    /// leaves of a tree): rays in random order take 1.8 times as long.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -169,12 +186,31 @@ impl TriangleBvh {
     pub(crate) fn occluded_in_turn(&self, rays: &[Ray], occluded: &mut [bool]) {
         dispatch!(Level::new(), _ => {
             for (ray, occluded) in rays.iter().zip(occluded) {
-                *occluded = self.find_any(ray);
+                *occluded = self.find_any(ray).is_some();
             }
         });
     }
 
-    /// The tree's own ray, of unit direction, and its t per t of the given one.
+    /// Something that each ray meets, not the nearest in general; on this thread.
+    pub(crate) fn obstacles_in_turn(&self, rays: &[Ray], found: &mut [Option<Obstacle>]) {
+        dispatch!(Level::new(), _ => {
+            for (ray, found) in rays.iter().zip(found) {
+                *found = self.find_any(ray).map(|(t, slot)| self.obstacle(t, slot));
+            }
+        });
+    }
+
+    /// The nearest thing that a ray meets.
+    pub(crate) fn closest_obstacle(&self, ray: &Ray) -> Option<Obstacle> {
+        self.find_closest(ray).map(|(hit, slot)| self.obstacle(hit.t, slot))
+    }
+
+    fn obstacle(&self, t: f32, slot: usize) -> Obstacle {
+        let RtTriangle { v0, e1, e2, .. } = self.triangles[slot];
+        Obstacle { t, corners: [v0, v0 - e1, v0 + e2].map(|p| Vec3::from(p) / self.scale) }
+    }
+
+    /// The tree's own ray, of unit direction, and its t per t of the given one; `None` if it misses the root.
     #[inline(always)]
     fn in_tree(&self, ray: &Ray) -> Option<(obvhs::ray::Ray, f32)> {
         let length = ray.direction.length();
@@ -184,7 +220,8 @@ impl TriangleBvh {
         }
         let (origin, direction) = (ray.origin * self.scale, ray.direction * (1.0 / length));
         let (from, to) = (ray.t_min * stretch, ray.t_max * stretch);
-        Some((obvhs::ray::Ray::new(origin.into(), direction.into(), from, to), stretch))
+        let ray = obvhs::ray::Ray::new(origin.into(), direction.into(), from, to);
+        (self.root.intersect_ray(&ray) < ray.tmax).then_some((ray, stretch))
     }
 
     /// The nearest hit and its place in `triangles`.
@@ -209,18 +246,20 @@ impl TriangleBvh {
         Some((Hit { triangle: nearest, t: ray.tmax / stretch, barycentrics }, slot))
     }
 
+    /// The t of some hit and its place in `triangles`.
     #[inline(always)]
-    fn find_any(&self, ray: &Ray) -> bool {
-        let Some((ray, _)) = self.in_tree(ray) else { return false };
+    fn find_any(&self, ray: &Ray) -> Option<(f32, usize)> {
+        let (ray, stretch) = self.in_tree(ray)?;
         let mut state = self.tree.new_traversal(ray.direction);
         let mut node;
         'search: {
             obvhs::traverse!(self.tree, node, state, node.intersect_ray(&ray, state.oct_inv4), {
-                if intersect(&self.triangles[state.primitive_id as usize], &ray).is_some() {
-                    break 'search true;
+                let slot = state.primitive_id as usize;
+                if let Some(t) = intersect(&self.triangles[slot], &ray) {
+                    break 'search Some((t / stretch, slot));
                 }
             });
-            false
+            None
         }
     }
 }
@@ -247,8 +286,8 @@ fn build_tree(triangles: &[Triangle]) -> CwBvh {
     bvh2_to_cwbvh(&binary, 3, true, false)
 }
 
-/// Weights closer than this to an edge are computed again in f64. Far above the rounding error of f32, which is
-/// 1e-7 times the distance of the ray's origin in triangle sizes.
+/// Rays that miss a triangle by less than this (as a weight) are tried again in f64: far more than f32 loses, which
+/// is 1e-7 times the distance of the ray's origin in triangle sizes.
 const NEAR_EDGE: f32 = 1.0 / 128.0;
 
 /// What a triangle is grown by in that case, so that its rounded edges leave no gap to its neighbour.
@@ -264,14 +303,14 @@ fn intersect(triangle: &RtTriangle, ray: &obvhs::ray::Ray) -> Option<f32> {
     let size = volume.abs();
     let u = f32::from_bits(across.dot(triangle.e2).to_bits() ^ sign);
     let v = f32::from_bits(across.dot(triangle.e1).to_bits() ^ sign);
-    let least = u.min(v).min(size - u - v);
-    if least >= 0.0 || (least > -NEAR_EDGE * size && meets_precisely(triangle, ray)) {
-        let t = triangle.ng.dot(to_corner) / volume;
-        if t >= ray.tmin && t <= ray.tmax {
-            return Some(t);
-        }
+    let w = size - u - v;
+    let meets = |least: f32| u >= least && v >= least && w >= least;
+    if !meets(-NEAR_EDGE * size) {
+        return None;
     }
-    None
+    let t = triangle.ng.dot(to_corner) / volume;
+    let in_range = t >= ray.tmin && t <= ray.tmax;
+    (in_range && (meets(0.0) || meets_precisely(triangle, ray))).then_some(t)
 }
 
 /// Whether the line of the ray passes through the triangle, grown a little.

@@ -29,7 +29,7 @@ impl Environment {
         // Air: the horizon's colour where the line of sight through it is long.
         let air = 1.0 - height.clamp(0.0, 1.0);
         let air2 = air * air;
-        let sky = zenith.lerp(horizon, air2 * air2 * (0.7 + 0.3 * air));
+        let sky = zenith.lerp(horizon, air * (0.15 + 0.85 * air2 * air));
 
         // The ground gets darker towards the feet and takes the colour of the air far away.
         let down = 1.0 - (-height).clamp(0.0, 1.0);
@@ -52,7 +52,7 @@ fn sun(direction: Vec3, light: &Light) -> Vec3 {
     let p128 = p32 * p32 * p32 * p32;
     let p512 = p128 * p128 * p128 * p128;
     let p2048 = p512 * p512 * p512 * p512;
-    let glow = 0.03 * p8 + 0.08 * p32 + 0.2 * p128 + 0.5 * p512 + 2.0 * p2048;
+    let glow = 0.03 * p8 + 0.08 * p32 + 0.15 * p128 + 0.3 * p512 + 0.8 * p2048;
     light.sun * (glow + SUN_DISC * smooth_step(SUN_EDGE[0], SUN_EDGE[1], facing))
 }
 

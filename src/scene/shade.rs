@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::accel::{Ray, TriangleBvh, triangle_bvh::CHUNK};
+use crate::accel::triangle_bvh::{CHUNK, Obstacle, Ray, TriangleBvh};
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::{Similarity, Surfels};
@@ -121,53 +121,56 @@ impl<'a> Sun<'a> {
     /// Whether the sun lights each point. Points that face away from it are not lit.
     pub fn visible(&self, points: &[SurfacePoint]) -> Vec<bool> {
         let rays: Vec<Ray> = points.iter().map(|point| self.shadow_ray(point)).collect();
-        let mut occluded = vec![false; points.len()];
-        self.occluders.occluded_in_turn(&rays, &mut occluded);
-        points
-            .iter()
-            .zip(&rays)
-            .zip(occluded)
-            .map(|((point, ray), occluded)| {
-                let facing = point.normal.dot(self.to_sun);
-                facing > 0.0
-                    && (!occluded || (facing < TERMINATOR && self.only_itself(point, *ray)))
-            })
-            .collect()
+        let mut obstacles = vec![None; points.len()];
+        self.occluders.obstacles_in_turn(&rays, &mut obstacles);
+        let lit = |((point, ray), obstacle): ((&SurfacePoint, &Ray), Option<Obstacle>)| {
+            point.normal.dot(self.to_sun) > 0.0
+                && obstacle
+                    .is_none_or(|o| self.is_itself(point, &o) && self.only_itself(point, *ray))
+        };
+        points.iter().zip(&rays).zip(obstacles).map(lit).collect()
     }
 
     /// From a little above the surface to the sun; an empty one for a point that faces away.
     fn shadow_ray(&self, point: &SurfacePoint) -> Ray {
-        let lift = self.apart.max(LIFT * point.extent);
         let faces = point.normal.dot(self.to_sun) > 0.0;
         Ray {
-            origin: point.position + point.normal * lift,
+            origin: point.position + point.normal * self.lift(point),
             direction: self.to_sun,
             t_min: 0.0,
             t_max: if faces { f32::INFINITY } else { -1.0 },
         }
     }
 
-    /// Whether all that the ray meets is the faceted surface that it starts from. Its facets would shade those
-    /// beside the shadow's edge as a whole, where the smooth surface is lit (cf. Hanika 2021). They are
-    /// close in their own measure, grazed by the light, and as far below the point as a surface gets by
-    /// bending from the point's normal to theirs; a plate above the ground is not.
+    /// How far above the surface a shadow ray starts.
+    fn lift(&self, point: &SurfacePoint) -> f32 {
+        self.apart.max(LIFT * point.extent)
+    }
+
+    /// Whether an obstacle belongs to the faceted surface that the point is on. Such facets would shade those beside
+    /// the shadow's edge as a whole, where the smooth surface is lit (cf. Hanika 2021). They are close in
+    /// their own measure, grazed by the light, and as far below the point as a surface gets by bending from
+    /// the point's normal to theirs; a plate above the ground is not.
+    fn is_itself(&self, point: &SurfacePoint, obstacle: &Obstacle) -> bool {
+        let [a, b, c] = obstacle.corners;
+        let edge = (b - a).length().max((c - b).length()).max((a - c).length());
+        let Some(normal) = (b - a).cross(c - a).try_normalize() else { return false };
+        let bend = normal.cross(point.normal).length();
+        let away = normal.dot(point.position - a).abs();
+        point.normal.dot(self.to_sun) < TERMINATOR
+            && normal.dot(self.to_sun).abs() < TERMINATOR
+            && obstacle.t < NEIGHBORHOOD * edge
+            && away < 0.75 * NEIGHBORHOOD * edge * bend + 2.0 * self.lift(point)
+    }
+
+    /// Whether all that a ray meets is the surface that it starts from.
     fn only_itself(&self, point: &SurfacePoint, mut ray: Ray) -> bool {
-        let lift = ray.origin.distance(point.position);
         for _ in 0..PASSES {
-            let Some((hit, [a, b, c])) = self.occluders.closest_with_corners(&ray) else {
-                return true;
-            };
-            let edge = (b - a).length().max((c - b).length()).max((a - c).length());
-            let Some(normal) = (b - a).cross(c - a).try_normalize() else { return false };
-            let bend = normal.cross(point.normal).length();
-            let away = normal.dot(point.position - a).abs();
-            if hit.t > NEIGHBORHOOD * edge
-                || normal.dot(self.to_sun).abs() > TERMINATOR
-                || away > 0.75 * NEIGHBORHOOD * edge * bend + 2.0 * lift
-            {
-                return false;
+            match self.occluders.closest_obstacle(&ray) {
+                None => return true,
+                Some(obstacle) if !self.is_itself(point, &obstacle) => return false,
+                Some(obstacle) => ray.t_min = obstacle.t + self.apart,
             }
-            ray.t_min = hit.t + self.apart;
         }
         false
     }
