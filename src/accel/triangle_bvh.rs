@@ -8,7 +8,7 @@
 use fearless_simd::{Level, dispatch};
 use glam::{UVec2, Vec3, Vec3A};
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh};
+use obvhs::cwbvh::{CwBvh, Traversal, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::splits::split_aabbs_preset;
@@ -149,12 +149,13 @@ impl TriangleBvh {
 
     /// The nearest triangle that a ray meets: see [`Ray`] for the arguments.
     pub fn closest(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<Hit> {
-        self.find_closest(&Ray { origin, direction, t_min, t_max }).map(|(hit, _)| hit)
+        self.find_closest(&Ray { origin, direction, t_min, t_max }, &mut Traversal::default())
+            .map(|(hit, _)| hit)
     }
 
     /// Whether a ray meets any triangle: see [`Ray`] for the arguments.
     pub fn occluded(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> bool {
-        self.find_any(&Ray { origin, direction, t_min, t_max }).is_some()
+        self.find_any(&Ray { origin, direction, t_min, t_max }, &mut Traversal::default()).is_some()
     }
 
     /// The nearest hit of each ray. Neighbours in the slice should be neighbours in space (tiles of a picture,
@@ -167,8 +168,9 @@ impl TriangleBvh {
         let level = Level::new();
         rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).for_each(|(rays, hits)| {
             dispatch!(level, _ => {
+                let mut state = Traversal::default();
                 for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = self.find_closest(ray).map(|(hit, _)| hit);
+                    *hit = self.find_closest(ray, &mut state).map(|(hit, _)| hit);
                 }
             });
         });
@@ -185,8 +187,9 @@ impl TriangleBvh {
     /// Whether each ray meets anything, on this thread.
     pub(crate) fn occluded_in_turn(&self, rays: &[Ray], occluded: &mut [bool]) {
         dispatch!(Level::new(), _ => {
+            let mut state = Traversal::default();
             for (ray, occluded) in rays.iter().zip(occluded) {
-                *occluded = self.find_any(ray).is_some();
+                *occluded = self.find_any(ray, &mut state).is_some();
             }
         });
     }
@@ -194,15 +197,17 @@ impl TriangleBvh {
     /// Something that each ray meets, not the nearest in general; on this thread.
     pub(crate) fn obstacles_in_turn(&self, rays: &[Ray], found: &mut [Option<Obstacle>]) {
         dispatch!(Level::new(), _ => {
+            let mut state = Traversal::default();
             for (ray, found) in rays.iter().zip(found) {
-                *found = self.find_any(ray).map(|(t, slot)| self.obstacle(t, slot));
+                *found = self.find_any(ray, &mut state).map(|(t, slot)| self.obstacle(t, slot));
             }
         });
     }
 
     /// The nearest thing that a ray meets.
     pub(crate) fn closest_obstacle(&self, ray: &Ray) -> Option<Obstacle> {
-        self.find_closest(ray).map(|(hit, slot)| self.obstacle(hit.t, slot))
+        self.find_closest(ray, &mut Traversal::default())
+            .map(|(hit, slot)| self.obstacle(hit.t, slot))
     }
 
     fn obstacle(&self, t: f32, slot: usize) -> Obstacle {
@@ -221,16 +226,17 @@ impl TriangleBvh {
         let (origin, direction) = (ray.origin * self.scale, ray.direction * (1.0 / length));
         let (from, to) = (ray.t_min * stretch, ray.t_max * stretch);
         let ray = obvhs::ray::Ray::new(origin.into(), direction.into(), from, to);
-        (self.root.intersect_ray(&ray) < ray.tmax).then_some((ray, stretch))
+        let any = !self.triangles.is_empty();
+        (any && self.root.intersect_ray(&ray) < ray.tmax).then_some((ray, stretch))
     }
 
     /// The nearest hit and its place in `triangles`.
     #[inline(always)]
-    fn find_closest(&self, ray: &Ray) -> Option<(Hit, usize)> {
+    fn find_closest(&self, ray: &Ray, state: &mut Traversal) -> Option<(Hit, usize)> {
         let (mut ray, stretch) = self.in_tree(ray)?;
         let mut nearest = u32::MAX;
         let mut slot = usize::MAX;
-        let mut state = self.tree.new_traversal(ray.direction);
+        state.reinit(ray.direction);
         let mut node;
         obvhs::traverse!(self.tree, node, state, node.intersect_ray(&ray, state.oct_inv4), {
             let i = state.primitive_id as usize;
@@ -248,9 +254,9 @@ impl TriangleBvh {
 
     /// The t of some hit and its place in `triangles`.
     #[inline(always)]
-    fn find_any(&self, ray: &Ray) -> Option<(f32, usize)> {
+    fn find_any(&self, ray: &Ray, state: &mut Traversal) -> Option<(f32, usize)> {
         let (ray, stretch) = self.in_tree(ray)?;
-        let mut state = self.tree.new_traversal(ray.direction);
+        state.reinit(ray.direction);
         let mut node;
         'search: {
             obvhs::traverse!(self.tree, node, state, node.intersect_ray(&ray, state.oct_inv4), {
