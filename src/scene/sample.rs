@@ -23,6 +23,7 @@ mod candidates;
 mod near;
 mod select;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 pub use allot::allot;
@@ -98,9 +99,8 @@ fn surfels(
             let triangle = sample.triangle as usize;
             let [a, b, c] = mesh.triangles()[triangle].map(|i| mesh.normals()[i as usize]);
             let smooth = a * weights[0] + b * weights[1] + c * weights[2];
-            let normal = smooth.try_normalize().or(sample.normal.try_normalize());
             let color = paint.color(mesh, triangle, weights, sample.position);
-            (normal.unwrap_or(glam::Vec3::Y), color)
+            (unit_normal(smooth, sample.normal), color)
         })
         .unzip_into_vecs(&mut normals, &mut albedo);
     Surfels {
@@ -109,9 +109,14 @@ fn surfels(
         z: axis(2),
         normals,
         albedo,
-        radiance: vec![glam::Vec3::ZERO; samples.len()],
+        radiance: vec![Vec3::ZERO; samples.len()],
         extent: vec![extent; samples.len()],
     }
+}
+
+/// The interpolated normal, or the triangle's where the corners' cancel out.
+fn unit_normal(smooth: Vec3, face: Vec3) -> Vec3 {
+    smooth.try_normalize().unwrap_or_else(|| face.normalize_or(Vec3::Y))
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ const LAST_RADIUS: f32 = 0.66;
 const SHRINK: f32 = 0.75;
 /// Below this distance, in mean spacings, it does not matter any more where samples lie.
 const LEAST_RADIUS: f32 = 0.02;
-/// The largest gaps are filled across blocks once so few samples are missing (one in this number).
+/// Once so few samples are missing (one in this number), they go into the largest gaps of all blocks.
 const FILL_SHARE: usize = 50;
 
 /// The state of a block between rounds.
@@ -83,20 +83,12 @@ pub(super) fn select(
         radius = factor * spacing;
         selection.round(radius, if i == 0 { Darts::All } else { Darts::Waiting })?;
     }
-    loop {
-        if selection.missing <= (count / FILL_SHARE).max(1) {
-            selection.fill(radius)?;
-        }
-        if selection.missing == 0 {
-            break;
-        }
+    while selection.missing > (count / FILL_SHARE).max(1) && radius > LEAST_RADIUS * spacing {
         radius *= SHRINK;
-        if radius < LEAST_RADIUS * spacing {
-            selection.force();
-            break;
-        }
         selection.round(radius, Darts::All)?;
     }
+    selection.fill(radius)?;
+    selection.force();
     let mut samples = Vec::with_capacity(count);
     samples.extend(selection.state.into_iter().flat_map(|block| block.taken));
     Ok(samples)
@@ -209,6 +201,9 @@ impl<'a> Selection<'a> {
     /// Puts the last few samples into the largest gaps, wherever they are, but never closer than `radius`.
     fn fill(&mut self, radius: f32) -> Result<()> {
         self.cx.step("sampling", 1.0 - self.missing as f64 / self.count as f64)?;
+        if self.missing == 0 {
+            return Ok(());
+        }
         let mut gaps: Vec<Gap> = (0..self.blocks.len())
             .into_par_iter()
             .map_init(Near::default, |near, block| self.gaps(near, block, radius))
@@ -234,14 +229,6 @@ impl<'a> Selection<'a> {
                 state.taken.push(candidate);
             }
         }
-        // Blocks that got more than their share leave less for the others.
-        let mut surplus =
-            self.state.iter().map(|block| block.missing).sum::<usize>() - self.missing;
-        for state in &mut self.state {
-            let less = state.missing.min(surplus);
-            state.missing -= less;
-            surplus -= less;
-        }
         Ok(())
     }
 
@@ -257,11 +244,12 @@ impl<'a> Selection<'a> {
         waiting.map(gap).filter(|gap| gap.distance >= radius * radius).collect()
     }
 
-    /// Gives every block its share of what is missing, however crowded: the surface is much smaller than
-    /// its area says, for it lies many times in the same place.
+    /// Gives the blocks what is still missing of their shares, however crowded they are: the surface is much
+    /// smaller than its area says, for it lies many times in the same place.
     fn force(&mut self) {
         for (block, state) in self.state.iter_mut().enumerate() {
-            let wanted = std::mem::take(&mut state.missing);
+            // Less than its share where the largest gaps were elsewhere.
+            let wanted = state.missing.min(self.missing);
             let mut known: Vec<u32> = state.taken.iter().map(|sample| sample.id).collect();
             known.sort_unstable();
             let rest = self
@@ -271,6 +259,7 @@ impl<'a> Selection<'a> {
                 .flat_map(|span| self.candidates.run(span.first, span.count, span.triangle));
             let rest = rest.filter(|candidate| known.binary_search(&candidate.id).is_err());
             state.taken.extend(rest.take(wanted));
+            self.missing -= wanted;
         }
     }
 }
