@@ -1,7 +1,9 @@
 //! Rays that a curved mirror sends on: exactly (at the interpolated normal) and as the continuous 3-ray camera has
 //! them (interpolated between the rays of the corners).
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+
+use super::Eye;
 
 /// Which length the rays of a 3-ray camera's corners have. It decides between what rays the camera's own lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +48,16 @@ pub fn weights_on_line(origin: DVec3, direction: DVec3, corners: [Vec3; 3]) -> O
     weights.iter().all(|w| w.is_finite()).then_some(weights)
 }
 
+/// Which rays a mirror sends on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RaySource {
+    /// Reflected at the interpolated normals: the truth.
+    #[default]
+    Surface,
+    /// The continuous 3-ray camera's own: the truth for the camera model.
+    Camera,
+}
+
 impl MirrorTriangle {
     /// The unit direction of the ray from `eye` reflected at the point with these weights by the interpolated (Phong)
     /// normal: the truth for a smooth mirror.
@@ -68,11 +80,48 @@ impl MirrorTriangle {
         })
     }
 
+    /// n_i·(eye - v_i) at each corner; `Σ w_i` of them is positive where a ray leaves the front side of the
+    /// smooth surface.
+    pub fn facing(&self, eye: Vec3) -> [f64; 3] {
+        std::array::from_fn(|i| {
+            self.normals[i].as_dvec3().dot(eye.as_dvec3() - self.corners[i].as_dvec3())
+        })
+    }
+
     /// The direction `Σ w_i d_i` of the 3-ray camera's own ray at the point with these weights; not unit.
     pub fn camera_direction(&self, eye: Vec3, weights: [f64; 3], scale: RayScale) -> DVec3 {
         let d = self.corner_directions(eye, scale);
         d[0] * weights[0] + d[1] * weights[1] + d[2] * weights[2]
     }
+}
+
+/// Origin and direction of the ray that a mirror triangle sends on from where it is seen at a picture position. Its direction has unit
+/// length for [`RaySource::Surface`] and the camera's for [`RaySource::Camera`].
+///
+/// The point is that of the triangle's plane, even a little outside the triangle: a sample belongs to the triangle that it
+/// names. `None` if the triangle is seen exactly edge-on or its normals cancel.
+pub fn reflected_ray(
+    eye: &Eye,
+    px: Vec2,
+    mirror: &MirrorTriangle,
+    source: RaySource,
+    scale: RayScale,
+) -> Option<(Vec3, Vec3)> {
+    let weights =
+        weights_on_line(eye.position.as_dvec3(), view_direction(eye, px), mirror.corners)?;
+    let direction = match source {
+        RaySource::Surface => mirror.surface_direction(eye.position, weights)?,
+        RaySource::Camera => mirror.camera_direction(eye.position, weights, scale),
+    };
+    Some((interpolate(mirror.corners, weights).as_vec3(), direction.as_vec3()))
+}
+
+/// [`Eye::ray_through_px`] in f64.
+fn view_direction(eye: &Eye, px: Vec2) -> DVec3 {
+    let focal = f64::from(eye.focal_px);
+    let x = (f64::from(px.x) - 0.5 * f64::from(eye.size.width)) / focal;
+    let y = (f64::from(px.y) - 0.5 * f64::from(eye.size.height)) / focal;
+    eye.forward.as_dvec3() + eye.right.as_dvec3() * x - eye.up.as_dvec3() * y
 }
 
 #[cfg(test)]

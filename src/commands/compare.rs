@@ -8,7 +8,7 @@ use catoptric::image::{Picture, Planes, aov, color, io};
 use serde_json::{Value, json};
 
 /// Compare a picture with a reference
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub(crate) struct Args {
     /// The picture: PNG, EXR, HDR or a file written with --aov (its reflection)
     a: PathBuf,

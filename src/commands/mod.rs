@@ -1,9 +1,9 @@
 //! The command line: one thin file a verb. It parses, calls the library and writes.
 
-pub mod bench;
-pub mod compare;
-pub mod info;
-pub mod render;
+pub(crate) mod bench;
+pub(crate) mod compare;
+pub(crate) mod info;
+pub(crate) mod render;
 
 use std::path::PathBuf;
 use std::time::Instant;

@@ -130,7 +130,7 @@ scalar_real!(f64);
 /// f32 lanes in a vector register (or several).
 pub trait Vector<S: Simd>: Real<Scalar = f32> {
     /// Number of lanes.
-    const LANES: usize;
+    const LANES: u32;
     /// `value` in every lane.
     fn broadcast(simd: S, value: f32) -> Self;
     /// The first `LANES` elements of `slice`.
@@ -179,7 +179,7 @@ macro_rules! vector_real {
         }
 
         impl<S: Simd> Vector<S> for $t<S> {
-            const LANES: usize = $n;
+            const LANES: u32 = $n;
             #[inline(always)]
             fn broadcast(simd: S, value: f32) -> Self {
                 Self::simd_from(simd, value)

@@ -131,6 +131,15 @@ impl<'a> Sun<'a> {
         points.iter().zip(&rays).zip(obstacles).map(lit).collect()
     }
 
+    /// Whether the sun lights one point.
+    pub fn visible_from(&self, point: &SurfacePoint) -> bool {
+        let facing = point.normal.dot(self.to_sun);
+        let ray = self.shadow_ray(point);
+        facing > 0.0
+            && (!self.occluders.occluded(ray.origin, ray.direction, ray.t_min, ray.t_max)
+                || (facing < TERMINATOR && self.only_itself(point, ray)))
+    }
+
     /// From a little above the surface to the sun; an empty one for a point that faces away.
     fn shadow_ray(&self, point: &SurfacePoint) -> Ray {
         let faces = point.normal.dot(self.to_sun) > 0.0;

@@ -6,6 +6,7 @@
 //! where on a triangle a view ray meets it.
 
 mod fill;
+mod patches;
 mod project;
 mod raster;
 mod tiles;
@@ -16,6 +17,7 @@ use glam::Vec3;
 use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
 
+pub use patches::{Cell, MirrorTriangleIndex, Patch, PatchScratch, PixelRect, patches};
 pub use project::MAX_SIDE;
 pub use raster::Scratch;
 pub use weights::{RayWeights, barycentrics};

@@ -262,7 +262,7 @@ impl Grid {
         let n = f64::from(self.n);
         let (i, j) = (f64::from(index / 2 % self.n), f64::from(index / 2 / self.n));
         let at = |i: f64, j: f64| DVec3::new(1.0 - (i + j) / n, i / n, j / n);
-        if index % 2 == 0 {
+        if index.is_multiple_of(2) {
             [at(i, j), at(i + 1.0, j), at(i, j + 1.0)]
         } else {
             [at(i + 1.0, j), at(i + 1.0, j + 1.0), at(i, j + 1.0)]

@@ -227,7 +227,7 @@ impl Projection<'_> {
             projections += u64::from(batch.count);
             while at < end {
                 let i = at as usize;
-                let lanes = (end - at).min(V::LANES as u32);
+                let lanes = (end - at).min(V::LANES);
                 let active = V::mask(simd, (1u64 << lanes) - 1);
                 let v1 = &self.camera.camera.v1;
                 let q = [

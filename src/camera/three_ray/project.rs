@@ -123,10 +123,9 @@ pub fn project<R: Real>(camera: &ThreeRay<R::Scalar>, q: [R; 3], lo: R, hi: R) -
     let (lambda, found) = roots.root[0];
     let mut image = [camera.image_at(q, lambda, found); 3];
     if roots.count > 1 {
-        for k in 1..3 {
-            let (lambda, found) = roots.root[k];
-            image[k] = camera.image_at(q, lambda, found);
-        }
+        let [_, (second, in_second), (third, in_third)] = roots.root;
+        image[1] = camera.image_at(q, second, in_second);
+        image[2] = camera.image_at(q, third, in_third);
     }
     Images { image, count: roots.count }
 }

@@ -171,7 +171,7 @@ fn every_lane_width_gives_the_same_bits() {
         points: &[[f32; 16]; 3],
     ) -> Vec<[u32; 4]> {
         let mut list = Vec::new();
-        for at in (0..16).step_by(V::LANES) {
+        for at in (0..16).step_by(V::LANES as usize) {
             let q = [0, 1, 2].map(|k| V::load(simd, &points[k][at..]));
             let (lo, hi) = (V::broadcast(simd, 0.0), V::broadcast(simd, 8.0));
             for image in project(camera, q, lo, hi).as_slice() {
@@ -180,11 +180,11 @@ fn every_lane_width_gives_the_same_bits() {
                 image.b2.store(&mut b);
                 image.b3.store(&mut c);
                 let bits = V::bits(image.found);
-                for i in (0..V::LANES).filter(|i| bits >> i & 1 == 1) {
+                for i in (0..V::LANES as usize).filter(|i| bits >> i & 1 == 1) {
                     #[expect(clippy::cast_possible_truncation)]
                     list.push([(at + i) as u32, l[i].to_bits(), b[i].to_bits(), c[i].to_bits()]);
                 }
-            });
+            }
         }
         list.sort_unstable();
         list
@@ -196,6 +196,7 @@ fn every_lane_width_gives_the_same_bits() {
         let rays = numbers.camera(0.4, RayScale::EyeDistance);
         let camera = ThreeRay::<f32>::new(&rays, &rays);
         let mut points = [[0.0f32; 16]; 3];
+        #[expect(clippy::needless_range_loop)]
         for i in 0..16 {
             let (w, l) = (numbers.weights(), numbers.between(0.0, 4.0));
             let (v, d) = rays.at(w);
@@ -212,6 +213,7 @@ fn every_lane_width_gives_the_same_bits() {
             assert_eq!(wide, low);
         }
         let mut scalar = Vec::new();
+        #[expect(clippy::needless_range_loop)]
         for i in 0..16 {
             let q = [0, 1, 2].map(|k| points[k][i]);
             for image in project(&camera, q, 0.0f32, 8.0).as_slice() {
@@ -224,7 +226,7 @@ fn every_lane_width_gives_the_same_bits() {
                         image.b3.to_bits(),
                     ]);
                 }
-            });
+            }
         }
         scalar.sort_unstable();
         assert_eq!(wide, scalar);

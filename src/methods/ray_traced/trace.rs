@@ -1,21 +1,11 @@
 //! From positions in the picture to what their reflected rays meet.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::accel::{Hit, Ray, TriangleBvh, triangle_bvh::CHUNK};
 use crate::camera::Eye;
-use crate::camera::mirror_ray::{MirrorTriangle, RayScale, interpolate, weights_on_line};
-
-/// Which rays a mirror sends on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RaySource {
-    /// Reflected at the interpolated normals: the truth.
-    #[default]
-    Surface,
-    /// The continuous 3-ray camera's own: the truth for the camera model.
-    Camera,
-}
+use crate::camera::mirror_ray::{MirrorTriangle, RayScale, RaySource, reflected_ray};
 
 /// A position in the picture at which a mirror is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,35 +57,6 @@ pub fn visible_mirrors(
     }
 }
 
-/// The ray that a mirror triangle sends on from where it is seen at a picture position. Its direction has unit
-/// length for [`RaySource::Surface`] and the camera's for [`RaySource::Camera`].
-///
-/// The point is that of the triangle's plane, even a little outside the triangle: a sample belongs to the triangle that it
-/// names. `None` if the triangle is seen exactly edge-on or its normals cancel.
-pub fn reflected_ray(
-    eye: &Eye,
-    px: Vec2,
-    mirror: &MirrorTriangle,
-    source: RaySource,
-    scale: RayScale,
-) -> Option<Ray> {
-    let weights =
-        weights_on_line(eye.position.as_dvec3(), view_direction(eye, px), mirror.corners)?;
-    let direction = match source {
-        RaySource::Surface => mirror.surface_direction(eye.position, weights)?,
-        RaySource::Camera => mirror.camera_direction(eye.position, weights, scale),
-    };
-    Some(Ray::new(interpolate(mirror.corners, weights).as_vec3(), direction.as_vec3()))
-}
-
-/// [`Eye::ray_through_px`] in f64.
-fn view_direction(eye: &Eye, px: Vec2) -> DVec3 {
-    let focal = f64::from(eye.focal_px);
-    let x = (f64::from(px.x) - 0.5 * f64::from(eye.size.width)) / focal;
-    let y = (f64::from(px.y) - 0.5 * f64::from(eye.size.height)) / focal;
-    eye.forward.as_dvec3() + eye.right.as_dvec3() * x - eye.up.as_dvec3() * y
-}
-
 /// [`reflected_ray`] of each sample; empty rays (see [`Ray`]) where there is none.
 ///
 /// # Panics
@@ -112,7 +73,8 @@ pub fn reflected_rays(
     let none = Ray { origin: Vec3::ZERO, direction: Vec3::ZERO, t_min: 0.0, t_max: -1.0 };
     samples.par_iter().with_min_len(CHUNK).zip(rays).for_each(|(sample, ray)| {
         let mirror = &mirrors[sample.mirror_triangle as usize];
-        *ray = reflected_ray(eye, sample.px, mirror, source, scale).unwrap_or(none);
+        let made = reflected_ray(eye, sample.px, mirror, source, scale);
+        *ray = made.map_or(none, |(origin, direction)| Ray::new(origin, direction));
     });
 }
 
@@ -159,8 +121,11 @@ pub fn trace_reflected(
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::camera::eye::ImageSize;
+    use crate::camera::mirror_ray::weights_on_line;
 
     fn eye() -> Eye {
         let size = ImageSize { width: 64, height: 48 };
@@ -198,13 +163,10 @@ mod tests {
         for source in [RaySource::Surface, RaySource::Camera] {
             for px in [Vec2::new(32.5, 20.5), Vec2::new(30.12, 27.9)] {
                 let ray = reflected_ray(&eye, px, &mirror, source, RayScale::default()).unwrap();
-                let seen = eye.project_px(ray.origin).unwrap();
+                let seen = eye.project_px(ray.0).unwrap();
                 assert!(seen.distance(px) < 1e-4, "{seen} instead of {px}");
-                let weights = weights_on_line(
-                    ray.origin.as_dvec3(),
-                    mirror.normals[0].as_dvec3(),
-                    mirror.corners,
-                );
+                let weights =
+                    weights_on_line(ray.0.as_dvec3(), mirror.normals[0].as_dvec3(), mirror.corners);
                 let exact = match source {
                     RaySource::Surface => mirror.surface_direction(eye.position, weights.unwrap()),
                     RaySource::Camera => Some(mirror.camera_direction(
@@ -213,7 +175,7 @@ mod tests {
                         RayScale::EyeDistance,
                     )),
                 };
-                assert!(ray.direction.distance(exact.unwrap().as_vec3()) < 1e-5);
+                assert!(ray.1.distance(exact.unwrap().as_vec3()) < 1e-5);
             }
         }
         let edge_on = MirrorTriangle { corners: [eye.position, Vec3::ZERO, Vec3::X], ..mirror };
@@ -273,7 +235,8 @@ mod tests {
         reflected_rays(&eye, &samples, &mirrors, source, scale, &mut rays);
         for (sample, ray) in samples.iter().zip(rays) {
             let mirror = &mirrors[sample.mirror_triangle as usize];
-            assert_eq!(Some(ray), reflected_ray(&eye, sample.px, mirror, source, scale));
+            let alone = reflected_ray(&eye, sample.px, mirror, source, scale);
+            assert_eq!(Some((ray.origin, ray.direction)), alone);
         }
     }
 }

@@ -90,7 +90,8 @@ fn every_key_arrives() {
     );
     let (min, max) = crate::scene::fit::world_bounds(&floor.mesh, &floor.transform);
     assert!(((max - min).length() - 3.0).abs() < 1e-12);
-    assert!((0.5 * (min + max) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
+    let bottom = DVec3::new(0.5 * (min.x + max.x), min.y, 0.5 * (min.z + max.z));
+    assert!((bottom - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
     assert_eq!((ball.name.as_str(), ball.density), ("sphere", 1.0));
     assert_eq!(ball.paint, Paint::Constant(Vec3::new(0.1, 0.2, 0.3)));
     assert!(ball.mesh.triangles().len() > mirror.mesh.triangles().len());

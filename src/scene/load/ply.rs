@@ -82,7 +82,7 @@ fn header<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Header, usize, &'a [u8])>
     )?;
     // The parser keeps the last of several of one name, and would then lose its place in the data.
     let said = |word: &str| text.lines().filter(|l| l.split(' ').next() == Some(word)).count();
-    let properties = header.elements.values().map(|e| e.properties.len()).sum();
+    let properties: usize = header.elements.values().map(|e| e.properties.len()).sum();
     if said("element") != header.elements.len() || said("property") != properties {
         let problem = "has a header that gives two elements or properties the same name";
         return Err(Error::file(path, "", problem, REPAIR));
