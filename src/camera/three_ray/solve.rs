@@ -11,7 +11,7 @@ pub struct Cubic<R> {
 }
 
 /// Newton stops a lane when its step is below this share of λ: the next one would be its square.
-const STEP_SHARE: f64 = 1.0 / (1 << 20) as f64;
+const STEP_SHARE: f64 = 1.0 / (1 << 12) as f64;
 /// Enough for bisection alone to end at the precision of f32; a smooth piece takes two or three.
 const MAX_STEPS: usize = 24;
 
