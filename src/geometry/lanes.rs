@@ -16,6 +16,9 @@ pub trait Scalar:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
+    /// Square root of the precision: the error of one more step of a method that converges quadratically is below
+    /// the precision when its last step was below this.
+    const ROOT_EPSILON: f64;
     /// Rounds to this type.
     fn from_f64(value: f64) -> Self;
     /// Exact.
@@ -23,6 +26,7 @@ pub trait Scalar:
 }
 
 impl Scalar for f32 {
+    const ROOT_EPSILON: f64 = 1.0 / (1 << 12) as f64;
     #[expect(clippy::cast_possible_truncation, reason = "the one rounding")]
     fn from_f64(value: f64) -> Self {
         value as Self
@@ -33,6 +37,7 @@ impl Scalar for f32 {
 }
 
 impl Scalar for f64 {
+    const ROOT_EPSILON: f64 = 1.0 / (1 << 26) as f64;
     fn from_f64(value: f64) -> Self {
         value
     }

@@ -18,6 +18,10 @@ use crate::visibility::{NONE_ID, Patch, Visibility};
 pub(crate) const EMPTY: u64 = u64::MAX;
 /// Not a pixel of the patch: nothing is nearer.
 const FOREIGN: u64 = 0;
+/// Set in the keys of images outside the camera's triangle. They lie where the neighbour's camera might put them
+/// elsewhere (beyond a crease or silhouette it does), so they only fill what no image inside covers. Depths are not
+/// negative: their sign bit is free.
+pub(crate) const GUARD: u64 = 1 << 63;
 /// The paper counts an image as valid if no weight is below minus this (maths: tolerance over shared edges).
 pub(crate) const EDGE_TOLERANCE: f32 = 1e-3;
 /// Surfels projected at a time before they are splatted.
@@ -291,7 +295,8 @@ impl Projection<'_> {
                 for image in project(&self.camera.camera, q, lo, hi).as_slice() {
                     let front = zero.lt(image.linear(self.camera.front)) & active;
                     let inside = image.within([EDGE_TOLERANCE; 3]) & front;
-                    seen |= V::bits(inside);
+                    let own = V::bits(inside);
+                    seen |= own;
                     let mut drawn = image.within(self.camera.guard) & front;
                     if self.pass.first_root_only {
                         drawn = drawn & !taken;
@@ -321,7 +326,9 @@ impl Projection<'_> {
                             reason = "see above"
                         )]
                         let slot = ys[l] as u32 * self.stride + xs[l] as u32;
-                        let key = u64::from(depths[l].to_bits()) << 32 | u64::from(at + lane);
+                        let guard = if own >> lane & 1 == 0 { GUARD } else { 0 };
+                        let key =
+                            u64::from(depths[l].to_bits()) << 32 | guard | u64::from(at + lane);
                         hits.push(Hit { key, slot });
                     }
                 }
