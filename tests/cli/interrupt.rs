@@ -4,7 +4,7 @@
 use std::process::Command;
 use std::time::Duration;
 
-use super::{Folder, SMALL};
+use super::{Folder, Run, SMALL};
 
 fn interrupted(line: &str) {
     let folder = Folder::new();
@@ -17,11 +17,9 @@ fn interrupted(line: &str) {
     std::thread::sleep(Duration::from_millis(1500));
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(sent.success());
-    let output = child.wait_with_output().unwrap();
-    let err = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{err}");
-    assert_eq!(err, "cancelled: nothing was written\n");
-    assert_eq!(output.stdout, b"");
+    let run = Run::of(words, child);
+    assert_eq!(run.code, Some(130), "{}", run.err);
+    assert_eq!((run.err.as_str(), run.out.as_str()), ("cancelled: nothing was written\n", ""));
     assert_eq!(folder.listing(), before);
     assert_eq!(folder.read("out.png"), b"old");
 }

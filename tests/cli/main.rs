@@ -9,7 +9,7 @@ mod same_bytes;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -62,18 +62,9 @@ impl Folder {
         command
     }
 
-    /// Runs to the end; a run beyond [`LIMIT`] is ended and fails the test.
+    /// Runs to the end.
     fn finish(&self, mut command: Command) -> Run {
-        let mut child = command.spawn().unwrap();
-        let start = Instant::now();
-        while child.try_wait().unwrap().is_none() {
-            if start.elapsed() > LIMIT {
-                child.kill().unwrap();
-                panic!("{command:?} takes more than {LIMIT:?}");
-            }
-            std::thread::sleep(Duration::from_millis(2));
-        }
-        Run::new(format!("{command:?}"), child.wait_with_output().unwrap())
+        Run::of(format!("{command:?}"), command.spawn().unwrap())
     }
 
     /// Runs the words of a line.
@@ -124,14 +115,19 @@ struct Run {
 }
 
 impl Run {
-    fn new(line: String, output: Output) -> Self {
-        let text = |bytes| String::from_utf8(bytes).unwrap();
-        Self {
-            line,
-            code: output.status.code(),
-            out: text(output.stdout),
-            err: text(output.stderr),
+    /// Waits for the end; a run beyond [`LIMIT`] is ended and fails the test.
+    fn of(line: String, mut child: Child) -> Self {
+        let start = Instant::now();
+        while child.try_wait().unwrap().is_none() {
+            if start.elapsed() > LIMIT {
+                child.kill().unwrap();
+                panic!("{line} takes more than {LIMIT:?}");
+            }
+            std::thread::sleep(Duration::from_millis(2));
         }
+        let Output { status, stdout, stderr } = child.wait_with_output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        Self { line, code: status.code(), out: text(stdout), err: text(stderr) }
     }
 }
 

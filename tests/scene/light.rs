@@ -9,7 +9,7 @@ use super::{
     BLUE, GREY, RED, looks, moved, near, object, prepared, rendered, scene, shape, turned,
 };
 
-const SIZE: [u32; 2] = [480, 270];
+const SIZE: [u32; 2] = [960, 540];
 
 /// A torus and a cube that throw shadows on a floor before an upright flat mirror in z = `mirror_z`.
 fn before_a_mirror(mirror_z: f64, eye: DVec3) -> Scene {
@@ -31,22 +31,28 @@ fn a_flat_mirror_shows_the_colours_of_the_direct_view() {
     let direct = prepared(&before_a_mirror(-20.0, mirrored), 9);
     let (direct, _) = rendered(&direct, "raytrace", SIZE[0], SIZE[1]);
     let scene = prepared(&before_a_mirror(0.0, eye), 400_000);
-    for (method, wanted) in [("raytrace", 0.95), ("c3rc", 0.93)] {
+    let width = SIZE[0] as usize;
+    for method in ["raytrace", "c3rc"] {
         let (picture, planes) = rendered(&scene, method, SIZE[0], SIZE[1]);
-        let (mut pixels, mut alike) = (0, 0);
-        let width = SIZE[0] as usize;
-        for (i, color) in picture.rgb.iter().enumerate() {
-            if planes.reason[i] == Reason::Object as u32 {
-                // A mirror swaps left and right.
-                let twin = &direct.rgb[i / width * width + width - 1 - i % width];
-                pixels += 1;
-                alike += u32::from(near(color, twin, 0.01));
+        for (object, name) in ["torus", "cube", "floor"].into_iter().enumerate() {
+            // A splat may lie a pixel beside its surfel, which on the torus is another normal.
+            let splats = method == "c3rc";
+            let tolerance = if splats && name == "torus" { 0.08 } else { 0.01 };
+            // Outlines and the rims of shadows differ: the direct view is antialiased, and splats are fat.
+            let wanted = if splats { 0.86 } else { 0.95 };
+            let (mut pixels, mut alike) = (0, 0);
+            for (i, color) in picture.rgb.iter().enumerate() {
+                if planes.object[i] as usize == object {
+                    // A mirror swaps left and right.
+                    let twin = &direct.rgb[i / width * width + width - 1 - i % width];
+                    pixels += 1;
+                    alike += u32::from(near(color, twin, tolerance));
+                }
             }
+            let share = f64::from(alike) / f64::from(pixels);
+            assert!(pixels > 1000, "{method}, {name}: {pixels}");
+            assert!(share > wanted, "{method}, {name}: {share} of {pixels} pixels are alike");
         }
-        assert!(pixels > 5000, "{pixels}");
-        let share = f64::from(alike) / f64::from(pixels);
-        // Outlines, edges and the rims of shadows differ: the direct view is antialiased.
-        assert!(share > wanted, "{method}: {share} of {pixels} pixels have the same colour");
     }
 }
 
