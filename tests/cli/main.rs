@@ -1,5 +1,7 @@
 //! The program as a user runs it: what it writes, what it says, and how it refuses what it cannot do.
 
+#![expect(clippy::unwrap_used, reason = "a test fails where it panics")]
+
 mod bad_files;
 mod bad_options;
 mod interrupt;

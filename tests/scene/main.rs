@@ -1,6 +1,8 @@
 //! The whole pipeline through the library: scenes made in code, prepared, rendered, and held against what must
 //! come out.
 
+#![expect(clippy::unwrap_used, reason = "a test fails where it panics")]
+
 mod light;
 mod moves;
 mod plane_mirror;

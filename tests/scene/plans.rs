@@ -3,7 +3,7 @@
 use catoptric::Context;
 use catoptric::backend::{Backend, cpu::Cpu, cpu::finish};
 use catoptric::geometry::Similarity;
-use catoptric::methods::{FrameInput, METHODS, Params, method};
+use catoptric::methods::{FrameInput, METHODS, Params};
 use catoptric::plan::{Plan, Reflection, Resource};
 use catoptric::visibility::{Scratch, Visibility};
 use glam::DVec3;
@@ -44,6 +44,7 @@ fn every_pass_finds_what_it_reads() {
 
 #[test]
 fn swapped_and_lost_passes_are_found_out() {
+    let mut swapped = 0;
     with_plans(|id, mut plan, scene, visibility| {
         if plan.passes.len() < 2 {
             return;
@@ -60,8 +61,7 @@ fn swapped_and_lost_passes_are_found_out() {
         plan.passes.swap(0, 1);
         plan.passes.remove(0);
         assert_eq!(plan.missing_resource(), Some(Resource::Keys), "{id}");
+        swapped += 1;
     });
-    // Else nothing would have been swapped.
-    with_plans(|id, plan, _, _| assert!(id != "c3rc" || plan.passes.len() == 2));
-    assert!(method("c3rc").is_some());
+    assert!(swapped > 0, "no method has two passes");
 }
