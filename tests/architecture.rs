@@ -114,7 +114,8 @@ fn check(module: &[String], text: &str) -> Vec<Broken> {
         } else if used == room || ANYONE.contains(&used) || allowed.contains(&used) {
             continue;
         } else {
-            format!("{room} may not use {used}, only: {}", allowed.join(", "))
+            let allowed: Vec<&str> = allowed.iter().copied().chain(ANYONE).collect();
+            format!("{room} may not use {used}, only {}", allowed.join(", "))
         };
         broken.push(Broken { line, rule });
     }
@@ -299,7 +300,7 @@ mod checker {
         let nested = "use crate::{\n  plan::{Batch, methods},\n  error::Error,\n  frame::{self, Renderer},\n};";
         assert_eq!(lines("cull.rs", nested), [4]);
         let rules = check(&["accel".into()], "use crate::scene::Scene;");
-        assert_eq!(rules[0].rule, "accel may not use scene, only: geometry");
+        assert_eq!(rules[0].rule, "accel may not use scene, only geometry, error, context");
     }
 
     #[test]

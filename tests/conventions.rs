@@ -44,7 +44,7 @@ fn pixel_0_0_is_at_the_top_left() {
     assert!(right_and_up.x > middle.x && right_and_up.y < middle.y, "{right_and_up}");
 
     // A mirror in the corner to the left and up is seen in the first pixel, and not in the last ones.
-    let corner = [Vec3::new(-9.0, 0.5, 0.0), Vec3::new(-0.5, 9.0, 0.0), Vec3::new(-9.0, 9.0, 0.0)];
+    let corner = [Vec3::new(-9.0, -4.0, 0.0), Vec3::new(4.0, 9.0, 0.0), Vec3::new(-9.0, 9.0, 0.0)];
     let mirror = SurfaceMesh { positions: &corner, triangles: &[[0, 1, 2]] };
     let mut seen = Visibility::default();
     seen.update(&eye, &[mirror], &[], &mut Scratch::default());
@@ -110,6 +110,7 @@ fn a_reflection_lies_where_a_mirror_puts_it() {
 
     // The mirrored square, as the eye would see it without the mirror.
     let image = eye.project_px(center * Vec3::new(1.0, 1.0, -1.0)).expect("in front");
+    assert!(image.x > 80.0 && image.y < 45.0, "to the right and up: {image}");
     let half_px = 0.25 * eye.focal_px / (5.0 + height);
     for y in 0..SIZE.height {
         for x in 0..SIZE.width {
