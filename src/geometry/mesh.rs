@@ -95,6 +95,16 @@ impl Mesh {
         Ok(mesh)
     }
 
+    /// No vertices, no triangles: the mesh of things that are known by their surfels only.
+    pub(crate) const fn none() -> Self {
+        Self {
+            positions: Vec::new(),
+            normals: Vec::new(),
+            colors: Vec::new(),
+            triangles: Vec::new(),
+        }
+    }
+
     /// Vertex positions.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions

@@ -8,6 +8,7 @@ pub mod environment;
 #[cfg(feature = "cli")]
 pub mod file;
 pub mod fit;
+pub mod given;
 #[cfg(feature = "cli")]
 mod library;
 #[cfg(feature = "cli")]
@@ -16,4 +17,5 @@ pub mod prepared;
 pub mod sample;
 pub mod shade;
 
+pub use given::GivenSurfels;
 pub use prepared::{PrepareOptions, PreparedScene};

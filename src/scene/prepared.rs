@@ -10,7 +10,8 @@ use glam::{DVec3, Vec3};
 use super::description::{Environment, EyeDescription, Light, Paint, Scene};
 use super::{sample, shade};
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
-use crate::camera::MirrorTriangle;
+use crate::camera::eye::ImageSize;
+use crate::camera::{Eye, MirrorTriangle};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::surfel::PADDING;
@@ -155,11 +156,28 @@ impl PreparedScene {
             let problem = format!("{} is not between 0 and 1", options.tree.leaf_size);
             return Err(Error::input("--leaf-size", "", problem, "choose a share such as 0.01"));
         }
-        let mut times = PrepareTimes::default();
         let start = Instant::now();
         let sampled = sample_objects(scene, options, cx)?;
-        times.sample_ms = milliseconds(start);
+        let sample_ms = milliseconds(start);
+        let mut prepared = Self::of_sampled(scene, sampled, options.tree, cx)?;
+        prepared.times.sample_ms = sample_ms;
+        let start = Instant::now();
+        prepared.shade(cx)?;
+        prepared.times.shade_ms = milliseconds(start);
+        Ok(prepared)
+    }
 
+    /// Sorts the objects' surfels into trees and puts everything in its place, unshaded. `sampled` holds each
+    /// object's surfels, none of them empty.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub(super) fn of_sampled(
+        scene: &Scene,
+        sampled: Vec<Surfels>,
+        limits: KdTreeLimits,
+        cx: &Context,
+    ) -> Result<Self> {
         let start = Instant::now();
         let mut surfels = Surfels::default();
         let mut objects = Vec::with_capacity(sampled.len());
@@ -167,7 +185,7 @@ impl PreparedScene {
         let mut first_triangle = 0;
         for (object, mut own) in scene.objects.iter().zip(sampled) {
             cx.step("building trees", objects.len() as f64 / scene.objects.len() as f64)?;
-            let tree = KdTree::build(&mut own, options.tree);
+            let tree = KdTree::build(&mut own, limits);
             let first = index(surfels.len());
             append(&mut surfels, own);
             objects.push(PreparedObject {
@@ -184,7 +202,7 @@ impl PreparedScene {
             first_triangle += index(object.mesh.triangles().len());
         }
         pad(&mut surfels);
-        times.tree_ms = milliseconds(start);
+        let times = PrepareTimes { tree_ms: milliseconds(start), ..PrepareTimes::default() };
 
         let mut prepared = Self {
             name: scene.name.clone(),
@@ -209,10 +227,14 @@ impl PreparedScene {
         for (i, object) in scene.objects.iter().enumerate() {
             prepared.place(i, &object.transform);
         }
-        let start = Instant::now();
-        prepared.shade(cx)?;
-        prepared.times.shade_ms = milliseconds(start);
         Ok(prepared)
+    }
+
+    /// The scene's own eye for a picture of this size; `None` if its description makes no view (see
+    /// [`Eye::new`]).
+    pub fn eye_for(&self, size: ImageSize) -> Option<Eye> {
+        let EyeDescription { position, target, up, fov_y } = self.eye;
+        Eye::new(position - self.origin, target - self.origin, up, fov_y, size)
     }
 
     /// Moves an object (object space to world). Its surfels and tree stay as they are; call
