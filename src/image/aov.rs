@@ -328,7 +328,7 @@ mod tests {
             let error = read_aov(&path).unwrap_err().to_string();
             assert!(error.contains("a.exr") && error.contains(expected), "{error}");
         };
-        refused("cannot be read");
+        refused("does not exist");
         std::fs::write(&path, "").unwrap();
         refused("the file is empty");
         std::fs::write(&path, "solid teapot").unwrap();
