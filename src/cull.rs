@@ -34,12 +34,10 @@ impl BatchSource for Culler<'_> {
         };
         let from = out.len();
         if self.test == BoxTest::None {
-            out.push(Batch {
-                first: object.surfels.start,
-                count: object.surfels.end - object.surfels.start,
-                lambda: camera.lambda,
-                roots: 1,
-            });
+            for first in object.surfels.clone().step_by(WHOLE_BATCH as usize) {
+                let count = (object.surfels.end - first).min(WHOLE_BATCH);
+                out.push(Batch { first, count, lambda: camera.lambda, roots: 1 });
+            }
         } else {
             dispatch!(self.level, simd => walk.run(simd, out));
         }
@@ -50,6 +48,9 @@ impl BatchSource for Culler<'_> {
         }
     }
 }
+
+/// Without a test, objects are cut into batches of so many surfels.
+const WHOLE_BATCH: u32 = 1 << 12;
 
 struct Walk<'a> {
     wide: &'a [WideNode],

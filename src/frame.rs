@@ -15,7 +15,8 @@ use crate::plan::{Plan, Reflection};
 use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::{self, NONE_ID, Visibility};
 
-/// What a frame did and took. Times in milliseconds; a stage that was not timed apart is `None`.
+/// What a frame did and took. Times in milliseconds; a stage that was not timed apart is `None`, and so is a
+/// count of what the method has none of.
 #[derive(Clone, Debug, Default)]
 pub struct FrameReport {
     /// Method id.
@@ -23,13 +24,13 @@ pub struct FrameReport {
     /// Backend id.
     pub backend: &'static str,
     /// Cameras (patch and object).
-    pub cameras: usize,
+    pub cameras: Option<usize>,
     /// Batches.
-    pub batches: u64,
+    pub batches: Option<u64>,
     /// Camera–surfel pairs projected.
-    pub projections: u64,
+    pub projections: Option<u64>,
     /// Pairs with an image.
-    pub valid: u64,
+    pub valid: Option<u64>,
     /// Pixels whose centre shows a mirror.
     pub mirror_pixels: usize,
     /// Those that reflect an object.
@@ -57,7 +58,8 @@ pub struct FrameReport {
 impl FrameReport {
     /// Share of the projected pairs that have an image; `None` if there were none.
     pub fn valid_share(&self) -> Option<f64> {
-        (self.projections > 0).then(|| self.valid as f64 / self.projections as f64)
+        let (projections, valid) = (self.projections?, self.valid?);
+        (projections > 0).then(|| valid as f64 / projections as f64)
     }
 
     /// The last report with every time replaced by the median over all.
@@ -175,16 +177,18 @@ impl Renderer {
         let planned_ms = milliseconds(start);
         let done =
             self.backend.execute(&plan, scene, &self.visibility, planes, &mut self.reflection)?;
+        // Only splat passes have cameras, batches and pairs.
+        let splats = done.passes_ms.is_some();
         let report = FrameReport {
             method: method.info().id,
             backend: self.backend.id(),
-            cameras: done.cameras,
-            batches: done.batches,
-            projections: done.projections,
-            valid: done.valid,
+            cameras: splats.then_some(done.cameras),
+            batches: splats.then_some(done.batches),
+            projections: splats.then_some(done.projections),
+            valid: splats.then_some(done.valid),
             mirror_pixels: self.visibility.mirror_ids.iter().filter(|&&id| id != NONE_ID).count(),
             covered_pixels: self.reflection.coverage.iter().filter(|&&c| c > 0.0).count(),
-            cameras_ms: done.passes_ms.map(|_| plan.times.cameras_ms),
+            cameras_ms: splats.then_some(plan.times.cameras_ms),
             cull_ms: done.cull_ms,
             project_ms: done.project_ms,
             splat_ms: done.splat_ms,

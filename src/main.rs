@@ -2,7 +2,7 @@
 
 mod commands;
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::Mutex;
@@ -14,7 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use commands::bench::{BenchArgs, What};
 use commands::render::{HowArgs, RenderArgs};
-use commands::{SceneArgs, with_method_flags};
+use commands::{SceneArgs, say, with_method_flags};
 
 /// Accurate reflections on curved mirrors, without ray-tracing hardware
 ///
@@ -57,14 +57,19 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if matches!(error.downcast_ref(), Some(Error::Cancelled)) => {
-            eprintln!("cancelled: nothing was written");
+            complain("cancelled: nothing was written");
             ExitCode::from(130)
         }
         Err(error) => {
-            eprintln!("error: {error:#}");
+            complain(&format!("error: {error:#}"));
             ExitCode::from(2)
         }
     }
+}
+
+/// One line on standard error, where someone may have stopped listening.
+fn complain(message: &str) {
+    let _ = writeln!(std::io::stderr(), "{message}");
 }
 
 fn run(cli: &Cli, matches: &clap::ArgMatches, cx: &Context) -> anyhow::Result<()> {
@@ -92,10 +97,10 @@ fn built_in_scene(cx: &Context) -> anyhow::Result<()> {
         json: None,
         repeat: 1,
     };
-    println!("Rendering the built-in scene to a picture (this version has no viewer window).");
+    say!("Rendering the built-in scene to a picture (this version has no viewer window).");
     commands::render::run(&args, &clap::ArgMatches::default(), cx)?;
     let place = std::path::absolute(&args.output)?;
-    println!("The picture is {}. Try `catoptric render --help` next.", place.display());
+    say!("The picture is {}. Try `catoptric render --help` next.", place.display());
     Ok(())
 }
 

@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use catoptric::Context;
 use catoptric::frame::{FrameReport, Renderer};
 use catoptric::methods::{Method, Params};
+use catoptric::{Context, Error};
 use clap::{ArgMatches, Args, Subcommand};
 use serde_json::json;
 
 use super::render::{HowArgs, figures};
-use super::{Ready, SceneArgs, check_json, chosen_method, ms, write_json};
+use super::{Ready, SceneArgs, check_json, chosen_method, ms, say, write_json};
 
 /// Measure, as ratios within one run
 #[derive(Args, Debug)]
@@ -38,7 +38,8 @@ pub(crate) struct LayerArgs {
     #[command(flatten)]
     how: HowArgs,
     /// Pairs of measurements
-    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 25, allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeat: u32,
     /// Write the figures as JSON
     #[arg(long, value_name = "FILE")]
@@ -64,6 +65,10 @@ pub(crate) fn layer(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> any
         cx.step("measuring", f64::from(i) / f64::from(args.repeat + WARM_UP))?;
         let report = a.run(&ready)?;
         let layer_ms = report.layer_ms.or(report.rays_ms).unwrap_or(f64::NAN);
+        if report.mirror_pixels == 0 {
+            let remedy = "choose another --eye, --target or --size";
+            return Err(Error::input("bench layer", "", "the eye sees no mirror", remedy).into());
+        }
         let rays_ms = b.run(&ready)?.rays_ms.unwrap_or(f64::NAN);
         if i >= WARM_UP {
             layers.push(layer_ms);
@@ -75,7 +80,7 @@ pub(crate) fn layer(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> any
     let report = FrameReport::median(&reports);
     let (layer_ms, rays_ms) = (quartiles(&mut layers), quartiles(&mut traced));
     let ratio = quartiles(&mut ratios);
-    println!(
+    say!(
         "{} by {}: layer {:.2} ms, rays {:.2} ms, ratio {:.3} (quartiles {:.3} to {:.3}, {} pairs)",
         ready.scene.name,
         report.method,

@@ -7,6 +7,8 @@ use catoptric::image::compare::{self, Comparison, Count, Percentiles, Set, Side}
 use catoptric::image::{Picture, Planes, aov, color, io};
 use serde_json::{Value, json};
 
+use super::{check_apart, say};
+
 /// Compare a picture with a reference
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct Args {
@@ -74,6 +76,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(path) = &args.heatmap {
         io::check_output(path)?;
     }
+    check_apart(&[("--json", args.json.as_deref()), ("--heatmap", args.heatmap.as_deref())])?;
     let mut a = Input::read(&args.a, args.aov_a.as_deref())?;
     let b = Input::read(&args.b, args.aov_b.as_deref())?;
     if let Some(planes) = &mut a.planes {
@@ -82,7 +85,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let set = b.set(&args.place, &args.b)?;
     let found = compare::compare(a.side(), b.side(), &set)
         .with_context(|| format!("comparing {} with {}", args.a.display(), args.b.display()))?;
-    print!("{}", report(&found, &args.place, &b.names));
+    say!("{}", report(&found, &args.place, &b.names));
     if let Some(path) = &args.json {
         let mut text = serde_json::to_string_pretty(&to_json(&found, &args.place, &b.names))?;
         text.push('\n');
@@ -174,7 +177,6 @@ fn report(found: &Comparison, place: &Where, names: &[String]) -> String {
             });
         }
     }
-    lines.push(String::new());
     lines.join("\n")
 }
 
@@ -341,7 +343,7 @@ mod tests {
             ("a.exr b.exr --where objects", "expected all, mirror, object or object=NAME"),
             ("a.exr b.png --where mirror", "give its AOV file"),
             ("a.exr b.png --where object=fox", "give its AOV file"),
-            ("a.exr c.png", "cannot be read"),
+            ("a.exr c.png", "does not exist"),
             ("a.exr b.exr --heatmap map.txt", ".png, .exr or .hdr"),
             ("a.png b.png --aov-b b.png", "no complete EXR file"),
         ] {

@@ -7,7 +7,7 @@ use catoptric::methods::{METHODS, Params};
 use clap::Args;
 use serde_json::json;
 
-use super::{SceneArgs, check_json, ms, write_json};
+use super::{SceneArgs, check_json, ms, say, write_json};
 
 /// Show what a scene holds: mirrors, objects, surfels, trees
 #[derive(Args, Debug)]
@@ -23,11 +23,11 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
     check_json(args.json.as_ref())?;
     let ready = args.scene.ready(None, cx)?;
     let scene = &ready.scene;
-    println!("{}: {} surfels", scene.name, scene.surfels.len());
+    say!("{}: {} surfels", scene.name, scene.surfels.len());
     let mut mirrors = Vec::new();
     for mirror in &scene.mirrors {
         let triangles = mirror.mesh.triangles().len();
-        println!("  mirror {}: {triangles} triangles", mirror.name);
+        say!("  mirror {}: {triangles} triangles", mirror.name);
         mirrors.push(json!({ "name": mirror.name, "triangles": triangles }));
     }
     let mut objects = Vec::new();
@@ -37,9 +37,12 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
         let tree = object.tree.statistics();
         let b = object.bounds;
         let (min, max) = (b.min.as_dvec3() + scene.origin, b.max.as_dvec3() + scene.origin);
-        println!(
+        say!(
             "  object {}: {triangles} triangles, {surfels} surfels; tree: {} leaves of {:.1}, mean depth {:.1}",
-            object.name, tree.leaves, tree.points_per_leaf, tree.mean_depth
+            object.name,
+            tree.leaves,
+            tree.points_per_leaf,
+            tree.mean_depth
         );
         objects.push(json!({
             "name": object.name,
@@ -58,13 +61,16 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
         let info = method.info();
         let refusal = method.qualify(scene, &Params::defaults(info.params)).err();
         let verdict = refusal.as_ref().map_or("can draw it".to_owned(), ToString::to_string);
-        println!("  method {}: {verdict}", info.id);
+        say!("  method {}: {verdict}", info.id);
         methods.push(json!({ "id": info.id, "refusal": refusal.map(|e| e.to_string()) }));
     }
     let times = scene.times;
-    println!(
+    say!(
         "  ms: load {:.0}, sampling {:.0}, trees {:.0}, shading {:.0}",
-        ready.load_ms, times.sample_ms, times.tree_ms, times.shade_ms
+        ready.load_ms,
+        times.sample_ms,
+        times.tree_ms,
+        times.shade_ms
     );
     let value = json!({
         "scene": scene.name,

@@ -3,9 +3,10 @@
 pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod info;
+mod memory;
 pub(crate) mod render;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Context as _;
@@ -24,6 +25,18 @@ use serde_json::{Value, json};
 /// Largest picture side: what the rasteriser's coordinates hold.
 const MAX_SIDE: u32 = 16_384;
 
+/// Threads beyond any machine's cores only cost memory.
+const MAX_THREADS: u64 = 1024;
+
+/// A line on standard output. Whoever reads it may stop (`catoptric info room | head -1`).
+macro_rules! say {
+    ($($what:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($what)*);
+    }};
+}
+pub(crate) use say;
+
 /// What to render and how to look at it.
 #[derive(Args, Debug)]
 pub(crate) struct SceneArgs {
@@ -37,16 +50,16 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "FILE|NAME")]
     object: Vec<String>,
     /// Surfels over all objects
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_SURFELS)]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_SURFELS, allow_negative_numbers = true)]
     surfels: usize,
     /// Surfels a tree leaf holds at most (default 16; 122 with --preset paper)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     leaf: Option<u32>,
     /// Tree nodes of at most this share of their object's size are leaves
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_negative_numbers = true)]
     leaf_size: f32,
     /// Seed of the sampling
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
     /// Eye position, world space
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
@@ -58,11 +71,12 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
     fov: Option<f64>,
     /// Picture size in pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_hyphen_values = true)]
     size: ImageSize,
     /// Threads (default: all cores)
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u64).range(1..=MAX_THREADS))]
+    threads: Option<u64>,
 }
 
 fn point(text: &str) -> Result<DVec3, String> {
@@ -119,7 +133,7 @@ impl SceneArgs {
     fn start_threads(&self) -> anyhow::Result<()> {
         if let Some(n) = self.threads {
             rayon::ThreadPoolBuilder::new()
-                .num_threads(n)
+                .num_threads(usize::try_from(n)?)
                 .build_global()
                 .context("--threads: the threads could not be started")?;
         }
@@ -128,6 +142,7 @@ impl SceneArgs {
 
     /// Loads and prepares. `leaf` is a preset's leaf size.
     pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
+        memory::check(self.surfels, self.size)?;
         self.start_threads()?;
         let start = Instant::now();
         let request = Request {
@@ -249,6 +264,18 @@ fn apply_flags(info: &MethodInfo, matches: &ArgMatches, params: &mut Params) -> 
                     ));
                 }
             }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses outputs that would overwrite one another.
+pub(crate) fn check_apart(outputs: &[(&str, Option<&Path>)]) -> Result<()> {
+    for (i, (option, path)) in outputs.iter().enumerate() {
+        let same = |(_, other): &&(&str, Option<&Path>)| path.is_some() && other == path;
+        if let Some((other, _)) = outputs[..i].iter().find(same) {
+            let problem = format!("names the same file as {other}");
+            return Err(Error::input(*option, "", problem, "give another name"));
         }
     }
     Ok(())

@@ -2,14 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use catoptric::Context;
 use catoptric::frame::{FrameReport, Renderer};
-use catoptric::image::aov::write_aov;
+use catoptric::geometry::lanes::simd_level;
+use catoptric::image::aov::{self, write_aov};
 use catoptric::image::io::{check_output, write_picture};
-use catoptric::{Context, Error};
 use clap::{ArgMatches, Args};
 use serde_json::{Value, json};
 
-use super::{Ready, SceneArgs, check_json, chosen_method, ms, write_json};
+use super::{Ready, SceneArgs, check_apart, check_json, chosen_method, ms, say, write_json};
 
 /// Render a scene to a picture
 #[derive(Args, Debug)]
@@ -28,7 +29,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
     /// Render so often and report medians
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(crate) repeat: u32,
 }
 
@@ -49,9 +51,14 @@ pub(crate) struct HowArgs {
 pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyhow::Result<()> {
     check_output(&args.output)?;
     if let Some(path) = &args.aov {
-        check_aov(path)?;
+        aov::check_output(path)?;
     }
     check_json(args.json.as_ref())?;
+    check_apart(&[
+        ("--output", Some(&args.output)),
+        ("--aov", args.aov.as_deref()),
+        ("--json", args.json.as_deref()),
+    ])?;
     let (method, params, leaf) =
         chosen_method(&args.how.method, args.how.preset.as_deref(), matches)?;
     let ready = args.scene.ready(leaf, cx)?;
@@ -80,20 +87,8 @@ pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyh
     Ok(())
 }
 
-fn check_aov(path: &Path) -> Result<(), Error> {
-    let exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    if !exr {
-        return Err(Error::file(
-            path,
-            "",
-            "AOVs are written as EXR only",
-            "give a name that ends in .exr",
-        ));
-    }
-    check_output(path)
-}
-
-/// The keys that the README documents. A stage that was not timed apart is null.
+/// The keys that the README documents. A stage that was not timed apart is null, and so is what the method has
+/// none of.
 pub(crate) fn figures(ready: &Ready, report: &FrameReport) -> Value {
     let scene = &ready.scene;
     let size = ready.eye.size;
@@ -112,6 +107,7 @@ pub(crate) fn figures(ready: &Ready, report: &FrameReport) -> Value {
         "mirror_pixels": report.mirror_pixels,
         "covered_pixels": report.covered_pixels,
         "threads": rayon::current_num_threads(),
+        "simd": simd_name(),
         "ms": {
             "load": ms(Some(ready.load_ms)),
             "sample": ms(Some(scene.times.sample_ms)),
@@ -130,9 +126,15 @@ pub(crate) fn figures(ready: &Ready, report: &FrameReport) -> Value {
     })
 }
 
+/// The instruction set in use, such as `avx2`.
+fn simd_name() -> String {
+    let level = format!("{:?}", simd_level());
+    level.split('(').next().unwrap_or_default().to_ascii_lowercase()
+}
+
 fn print(output: &Path, ready: &Ready, report: &FrameReport) {
     let size = ready.eye.size;
-    println!(
+    say!(
         "{}: {} x {}, {} by {} on {}",
         output.display(),
         size.width,
@@ -141,18 +143,17 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
         report.method,
         report.backend
     );
-    println!(
+    say!(
         "  {} surfels, {} mirror triangles, {} mirror pixels",
         ready.scene.surfels.len(),
         ready.scene.mirror_triangle_count(),
         report.mirror_pixels
     );
-    if let Some(share) = report.valid_share() {
-        println!(
-            "  {} cameras, {} batches, {} projections, {:.1} % valid",
-            report.cameras,
-            report.batches,
-            report.projections,
+    if let (Some(cameras), Some(batches), Some(projections), Some(share)) =
+        (report.cameras, report.batches, report.projections, report.valid_share())
+    {
+        say!(
+            "  {cameras} cameras, {batches} batches, {projections} projections, {:.1} % valid",
             share * 100.0
         );
     }
@@ -168,5 +169,5 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
         ("frame", report.frame_ms),
     ];
     let timed = stages.iter().filter_map(|(name, ms)| ms.map(|ms| format!("{name} {ms:.1}")));
-    println!("  ms: {}", timed.collect::<Vec<_>>().join(", "));
+    say!("  ms: {}", timed.collect::<Vec<_>>().join(", "));
 }

@@ -16,6 +16,9 @@ pub trait Scalar:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
+    /// Square root of the precision: the error of one more step of a method that converges quadratically is below
+    /// the precision when its last step was below this.
+    const ROOT_EPSILON: f64;
     /// Rounds to this type.
     fn from_f64(value: f64) -> Self;
     /// Exact.
@@ -23,6 +26,7 @@ pub trait Scalar:
 }
 
 impl Scalar for f32 {
+    const ROOT_EPSILON: f64 = 1.0 / (1 << 12) as f64;
     #[expect(clippy::cast_possible_truncation, reason = "the one rounding")]
     fn from_f64(value: f64) -> Self {
         value as Self
@@ -33,6 +37,7 @@ impl Scalar for f32 {
 }
 
 impl Scalar for f64 {
+    const ROOT_EPSILON: f64 = 1.0 / (1 << 26) as f64;
     fn from_f64(value: f64) -> Self {
         value
     }
@@ -205,6 +210,135 @@ macro_rules! vector_real {
 }
 vector_real!(f32x8, 8);
 vector_real!(f32x16, 16);
+
+/// Two vectors side by side: a kernel whose operations wait for each other runs two chains at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair<V>(V, V);
+
+macro_rules! pair_operator {
+    ($operator:ident, $method:ident) => {
+        impl<V: Real> $operator for Pair<V> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0), self.1.$method(other.1))
+            }
+        }
+    };
+}
+pair_operator!(Add, add);
+pair_operator!(Sub, sub);
+pair_operator!(Mul, mul);
+pair_operator!(Div, div);
+
+macro_rules! pair_scalar_operator {
+    ($operator:ident, $method:ident) => {
+        impl<V: Real<Scalar = f32>> $operator<f32> for Pair<V> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: f32) -> Self {
+                Self(self.0.$method(other), self.1.$method(other))
+            }
+        }
+    };
+}
+pair_scalar_operator!(Add, add);
+pair_scalar_operator!(Sub, sub);
+pair_scalar_operator!(Mul, mul);
+
+impl<V: Real> Neg for Pair<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0, -self.1)
+    }
+}
+
+/// The truth values of a [`Pair`].
+#[derive(Clone, Copy)]
+pub struct PairMask<M>(M, M);
+
+impl<M: BitAnd<Output = M>> BitAnd for PairMask<M> {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0, self.1 & other.1)
+    }
+}
+
+impl<M: BitOr<Output = M>> BitOr for PairMask<M> {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0, self.1 | other.1)
+    }
+}
+
+impl<M: Not<Output = M>> Not for PairMask<M> {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(!self.0, !self.1)
+    }
+}
+
+impl<V: Real<Scalar = f32>> Real for Pair<V> {
+    type Scalar = f32;
+    type Mask = PairMask<V::Mask>;
+    #[inline(always)]
+    fn splat(self, value: f32) -> Self {
+        Self(self.0.splat(value), self.1.splat(value))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> Self::Mask {
+        PairMask(self.0.lt(other.0), self.1.lt(other.1))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> Self::Mask {
+        PairMask(self.0.le(other.0), self.1.le(other.1))
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
+        Self(V::select(mask.0, a.0, b.0), V::select(mask.1, a.1, b.1))
+    }
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        V::any(mask.0 | mask.1)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt(), self.1.sqrt())
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+}
+
+impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
+    const LANES: u32 = 2 * V::LANES;
+    #[inline(always)]
+    fn broadcast(simd: S, value: f32) -> Self {
+        Self(V::broadcast(simd, value), V::broadcast(simd, value))
+    }
+    #[inline(always)]
+    fn load(simd: S, slice: &[f32]) -> Self {
+        Self(V::load(simd, slice), V::load(simd, &slice[V::LANES as usize..]))
+    }
+    #[inline(always)]
+    fn store(self, slice: &mut [f32]) {
+        self.0.store(slice);
+        self.1.store(&mut slice[V::LANES as usize..]);
+    }
+    #[inline(always)]
+    fn bits(mask: Self::Mask) -> u64 {
+        V::bits(mask.0) | V::bits(mask.1) << V::LANES
+    }
+    #[inline(always)]
+    fn mask(simd: S, bits: u64) -> Self::Mask {
+        PairMask(V::mask(simd, bits), V::mask(simd, bits >> V::LANES))
+    }
+}
 
 /// Environment variable that lowers the instruction set: `sse2`, `sse4.2` or `avx2`.
 pub const SIMD_VARIABLE: &str = "CATOPTRIC_SIMD";

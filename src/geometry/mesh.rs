@@ -51,7 +51,7 @@ pub enum MeshDefect {
 }
 
 /// Coordinates beyond this cannot be squared and summed safely in f32.
-const MAX_COORDINATE: f32 = 1e15;
+pub(crate) const MAX_COORDINATE: f32 = 1e15;
 
 impl Mesh {
     /// Checks the parts and completes the normals.

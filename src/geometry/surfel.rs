@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// Readable elements behind the last surfel, so that a vector load never leaves the arrays.
-pub const PADDING: usize = 16;
+pub const PADDING: usize = 32;
 
 /// Surfels (surface point samples) in the local space of their object, as a structure of arrays.
 #[derive(Clone, Debug, Default)]

@@ -63,7 +63,7 @@ pub fn check_place(path: &Path) -> Result<()> {
         return Err(output_error(path, "it names a folder"));
     }
     if replaceable(path) {
-        write_aside(path).map_err(|error| output_error(path, error))?;
+        write_aside(path).map_err(|error| output_error(path, plain(&error)))?;
     }
     Ok(())
 }
@@ -83,7 +83,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
         file.persist(path)?;
         Ok(())
     };
-    write().map_err(|error| output_error(path, error))
+    write().map_err(|error| output_error(path, plain(&error)))
 }
 
 /// Writes a picture in the format of its extension: .png (8-bit sRGB, clamped), .exr (linear, 32-bit float,
@@ -140,8 +140,16 @@ pub fn read_picture(path: &Path) -> Result<Picture> {
 
 /// The whole file.
 pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    let bytes = std::fs::read(path).map_err(|error| {
-        Error::file(path, "", format!("cannot be read: {error}"), "check the name and its rights")
+    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => {
+            Error::file(path, "", "does not exist", "check the name and the folder")
+        }
+        kind => Error::file(
+            path,
+            "",
+            format!("cannot be read: {kind}"),
+            "check the name and its rights",
+        ),
     })?;
     if bytes.is_empty() {
         return Err(Error::file(path, "", "the file is empty", "write it again"));
@@ -163,6 +171,14 @@ pub(super) fn not_finite(path: &Path, channel: &str, i: usize, width: u32) -> Er
 
 pub(super) fn output_error(path: &Path, problem: impl ToString) -> Error {
     Error::Output { name: path.display().to_string(), problem: problem.to_string() }
+}
+
+/// What the system said, without the name of the file aside.
+fn plain(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "its folder does not exist".into(),
+        kind => kind.to_string(),
+    }
 }
 
 fn picture_error(path: &Path, error: &ImageError) -> Error {
@@ -296,7 +312,7 @@ mod tests {
             let error = read_picture(&path).unwrap_err().to_string();
             assert!(error.contains(name) && error.contains(expected), "{error}");
         };
-        refused("missing.png", None, "cannot be read");
+        refused("missing.png", None, "does not exist");
         refused("empty.png", Some(b""), "empty");
         refused("text.png", Some(b"no picture at all"), "not a picture");
         for name in ["cut.png", "cut.exr", "cut.hdr"] {
@@ -329,8 +345,8 @@ mod tests {
         for (name, expected) in [
             ("a.jpg", ".png, .exr or .hdr"),
             ("a", ".png, .exr or .hdr"),
-            ("missing/a.png", "cannot be written"),
-            ("file/a.png", "cannot be written"),
+            ("missing/a.png", "cannot be written: its folder does not exist;"),
+            ("file/a.png", "cannot be written: not a directory;"),
             ("folder.png", "it names a folder"),
         ] {
             let picture = ramp(4, 4);

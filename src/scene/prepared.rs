@@ -139,7 +139,7 @@ impl PreparedScene {
     /// Samples, sorts and shades a scene.
     ///
     /// # Errors
-    /// Too many surfels, or cancelled.
+    /// An option is out of its range, or cancelled.
     pub fn new(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Result<Self> {
         if options.surfels == 0 || options.surfels > MAX_SURFELS {
             return Err(Error::input(
@@ -151,6 +151,10 @@ impl PreparedScene {
         }
         if options.tree.leaf_points == 0 {
             return Err(Error::input("--leaf", "", "0 is not a leaf size", "choose 1 or more"));
+        }
+        if !(0.0..=1.0).contains(&options.tree.leaf_size) {
+            let problem = format!("{} is not between 0 and 1", options.tree.leaf_size);
+            return Err(Error::input("--leaf-size", "", problem, "choose a share such as 0.01"));
         }
         let start = Instant::now();
         let sampled = sample_objects(scene, options, cx)?;

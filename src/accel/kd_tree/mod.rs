@@ -24,7 +24,7 @@ pub struct KdTreeLimits {
 impl Default for KdTreeLimits {
     /// Chosen by measurement on the placed dragon: see `benches/RESULTS.md`.
     fn default() -> Self {
-        Self { leaf_points: 16, leaf_size: 0.0 }
+        Self { leaf_points: 8, leaf_size: 0.0 }
     }
 }
 

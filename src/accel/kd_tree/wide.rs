@@ -7,6 +7,7 @@ use crate::geometry::Aabb;
 
 /// Children of a wide node.
 pub const CHILDREN: usize = 8;
+const WIDTH: u32 = 8;
 
 /// Eight boxes and what is in them. Unused ones are empty (count 0).
 #[derive(Clone, Copy, Debug)]
@@ -56,13 +57,16 @@ impl WideNode {
     }
 }
 
-/// Takes up to three binary levels together.
+/// Takes up to three binary levels together, the lowest ones always: nearly all nodes are just above the
+/// leaves, so those must be full.
 pub(super) fn collapse(nodes: &[Node]) -> Vec<WideNode> {
+    let leaves = leaf_counts(nodes);
     let mut wide = vec![WideNode::EMPTY];
     // (wide node, the binary node whose descendants it holds)
     let mut open = vec![(0usize, 0usize)];
     while let Some((at, root)) = open.pop() {
-        let children = descendants(nodes, root);
+        let mut children = Vec::with_capacity(CHILDREN);
+        descendants(nodes, &leaves, root, child_leaves(leaves[root]), &mut children);
         for (slot, &index) in children.iter().enumerate() {
             let node = &nodes[index];
             let child = if node.right == 0 { 0 } else { wide.len() };
@@ -79,20 +83,39 @@ pub(super) fn collapse(nodes: &[Node]) -> Vec<WideNode> {
     wide
 }
 
-/// Up to eight descendants that share out a node's surfels, in order. The node itself if it is a leaf.
-fn descendants(nodes: &[Node], root: usize) -> Vec<usize> {
-    let mut list = vec![root];
-    while list.len() < CHILDREN {
-        let inner = |&slot: &usize| nodes[list[slot]].right != 0;
-        // The fullest first: leaves of the same depth end up side by side.
-        let fullest = (0..list.len())
-            .filter(inner)
-            .max_by_key(|&slot| (nodes[list[slot]].count, std::cmp::Reverse(slot)));
-        let Some(slot) = fullest else { break };
-        let index = list[slot];
-        list.splice(slot..=slot, [index + 1, index + nodes[index].right as usize]);
+/// Leaves below each node.
+fn leaf_counts(nodes: &[Node]) -> Vec<u32> {
+    let mut counts = vec![1; nodes.len()];
+    for i in (0..nodes.len()).rev().filter(|&i| nodes[i].right != 0) {
+        counts[i] = counts[i + 1] + counts[i + nodes[i].right as usize];
     }
-    list
+    counts
+}
+
+/// The most leaves that a child of a node with so many should hold: a power of eight.
+fn child_leaves(leaves: u32) -> u32 {
+    let mut most = 1;
+    while most < leaves.div_ceil(WIDTH) {
+        most *= WIDTH;
+    }
+    most
+}
+
+/// Up to eight descendants that share out a node's surfels, in order: the first on each way down that hold no
+/// more than `most` leaves. The node itself if it is a leaf.
+fn descendants(nodes: &[Node], leaves: &[u32], root: usize, most: u32, list: &mut Vec<usize>) {
+    let mut open = vec![(root, CHILDREN)];
+    while let Some((index, slots)) = open.pop() {
+        let node = &nodes[index];
+        // Unbalanced trees (leaves by size) can need more slots than there are: those go one level deeper.
+        if node.right == 0 || slots < 2 || (index != root && leaves[index] <= most) {
+            list.push(index);
+        } else {
+            let half = slots / 2;
+            open.push((index + node.right as usize, slots - half));
+            open.push((index + 1, half));
+        }
+    }
 }
 
 pub(super) fn validate(wide: &[WideNode], nodes: &[Node]) -> Result<(), String> {

@@ -12,7 +12,7 @@ use crate::scene::prepared::PreparedScene;
 use crate::scene::shade::{Sun, SurfacePoint, shade};
 use crate::visibility::{NONE_ID, SurfaceMesh, Visibility};
 
-/// Completes `reflection` (environment, tint) and draws the picture of what the eye sees.
+/// Completes `reflection` (environment, tint; its planes' radiance, where there are planes) and draws the picture of what the eye sees.
 ///
 /// `white`: see [`DirectView::white`].
 pub fn finish(
@@ -43,6 +43,13 @@ pub fn finish(
                 }
             }
         });
+    if let Some(planes) = &mut reflection.planes {
+        let seen = visibility.mirror_ids.iter().zip(&reflection.radiance);
+        let of_mirror = |(&id, radiance): (&u32, &Vec3)| {
+            if id == NONE_ID { [0.0; 3] } else { radiance.to_array() }
+        };
+        planes.radiance = seen.map(of_mirror).collect();
+    }
     let mirrors = mirror_surfaces(scene);
     let objects = object_surfaces(scene);
     let view = DirectView {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::splat::{EMPTY, Projection};
+use super::splat::{EMPTY, GUARD, Projection};
 use crate::camera::three_ray::project;
 use crate::image::{NONE, Planes, Reason};
 use crate::plan::SplatPass;
@@ -85,7 +85,7 @@ fn of_patch(
                 continue;
             }
             let surfel = u32::try_from(key & u64::from(u32::MAX)).unwrap_or(NONE);
-            let depth = u32::try_from(key >> 32).unwrap_or(NONE);
+            let depth = u32::try_from((key & !GUARD) >> 32).unwrap_or(NONE);
             let object = scene.object_of_surfel(surfel);
             let camera = pass.cameras[cameras.clone()].iter().find(|c| c.object as usize == object);
             let Some(camera) = camera else { continue };

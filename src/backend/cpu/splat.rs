@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::pool::Pool;
 use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
-use crate::geometry::lanes::{Real, Vector, dot, simd_level};
+use crate::geometry::lanes::{Pair, Real, Vector, dot, simd_level};
 use crate::plan::{Batch, CameraInstance, DepthKey, SplatPass, SplatShape};
 use crate::visibility::{NONE_ID, Patch, Visibility};
 
@@ -18,10 +18,16 @@ use crate::visibility::{NONE_ID, Patch, Visibility};
 pub(crate) const EMPTY: u64 = u64::MAX;
 /// Not a pixel of the patch: nothing is nearer.
 const FOREIGN: u64 = 0;
+/// Set in the keys of images outside the camera's triangle. They lie where the neighbour's camera might put them
+/// elsewhere (beyond a crease or silhouette it does), so they only fill what no image inside covers. Depths are not
+/// negative: their sign bit is free.
+pub(crate) const GUARD: u64 = 1 << 63;
 /// The paper counts an image as valid if no weight is below minus this (maths: tolerance over shared edges).
 pub(crate) const EDGE_TOLERANCE: f32 = 1e-3;
 /// Surfels projected at a time before they are splatted.
 const CHUNK: usize = 2048;
+/// A camera with more surfels than this shares them with idle threads (untuned).
+const SHARE: usize = 1 << 15;
 /// One column and row around the tile takes what a 2 × 2 splat writes beyond it.
 const BORDER: u32 = 1;
 
@@ -79,13 +85,12 @@ pub(crate) fn splat(
     keys: &[AtomicU64],
 ) -> SplatCounters {
     let level = simd_level();
-    let width = visibility.size.width;
     (0..pass.patches.len())
         .into_par_iter()
         .map_init(
             || pool.take(),
             |scratch, index| {
-                splat_patch(pass, surfels, visibility, index, level, width, scratch, keys)
+                splat_patch(pass, surfels, visibility, index, level, pool, scratch, keys)
             },
         )
         .reduce(SplatCounters::default, SplatCounters::plus)
@@ -98,7 +103,7 @@ fn splat_patch(
     visibility: &Visibility,
     index: usize,
     level: Level,
-    width: u32,
+    pool: &Pool<Scratch>,
     scratch: &mut Scratch,
     keys: &[AtomicU64],
 ) -> SplatCounters {
@@ -112,30 +117,15 @@ fn splat_patch(
         let start = Instant::now();
         batches.clear();
         pass.batches.cull(camera, batches);
-        let mut last = Instant::now();
-        counters.cull_ns += nanoseconds(start, last);
+        counters.cull_ns += nanoseconds(start, Instant::now());
         counters.batches += batches.len() as u64;
         let work = Projection { pass, surfels, camera, patch, stride };
-        let mut open = batches.as_slice();
-        while !open.is_empty() {
-            let taken = take_chunk(open);
-            hits.clear();
-            let (projections, valid) =
-                dispatch!(level, simd => work.run::<_, f32x16<_>>(simd, taken, hits));
-            let projected = Instant::now();
-            splat_hits(hits, pass.shape, stride as usize, tile);
-            let done = Instant::now();
-            counters.projections += projections;
-            counters.valid += valid;
-            counters.project_ns += nanoseconds(last, projected);
-            counters.splat_ns += nanoseconds(projected, done);
-            last = done;
-            open = &open[taken.len()..];
-        }
+        let shared = Shared { work, visibility, level, pool };
+        counters = counters.plus(shared.project(batches, hits, tile));
     }
     for y in 0..patch.rect.height() {
         let row = ((y + BORDER) * stride + BORDER) as usize;
-        let to = ((patch.rect.min[1] + y) * width + patch.rect.min[0]) as usize;
+        let to = ((patch.rect.min[1] + y) * visibility.size.width + patch.rect.min[0]) as usize;
         let n = patch.rect.width() as usize;
         for (key, out) in tile[row..row + n].iter().zip(&keys[to..to + n]) {
             if *key != FOREIGN {
@@ -150,15 +140,79 @@ fn nanoseconds(from: Instant, to: Instant) -> u64 {
     u64::try_from((to - from).as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Batches whose surfels make up at most a chunk; at least one.
-fn take_chunk(open: &[Batch]) -> &[Batch] {
+/// One camera's work on one patch, which threads may share.
+#[derive(Clone, Copy)]
+struct Shared<'a> {
+    work: Projection<'a>,
+    visibility: &'a Visibility,
+    level: Level,
+    pool: &'a Pool<Scratch>,
+}
+
+impl Shared<'_> {
+    /// Projects and splats batches into `tile`. A wide camera sees nearly everything in a few pixels: its work is
+    /// halved between threads, each with a tile of its own; the nearest key wins, whoever found it.
+    fn project(
+        &self,
+        batches: &[Batch],
+        hits: &mut Vec<Hit>,
+        tile: &mut Vec<u64>,
+    ) -> SplatCounters {
+        let surfels: usize = batches.iter().map(|b| b.count as usize).sum();
+        if surfels <= SHARE || batches.len() < 2 {
+            return self.project_in_turn(batches, hits, tile);
+        }
+        let (left, right) = batches.split_at(batches.len() / 2);
+        let mut other = self.pool.take();
+        let Scratch { hits: other_hits, tile: other_tile, .. } = &mut *other;
+        let (a, b) = rayon::join(
+            || self.project(left, hits, tile),
+            || {
+                fill_tile(other_tile, self.work.patch, self.visibility);
+                self.project(right, other_hits, other_tile)
+            },
+        );
+        for (key, found) in tile.iter_mut().zip(other_tile) {
+            *key = (*key).min(*found);
+        }
+        a.plus(b)
+    }
+
+    fn project_in_turn(
+        &self,
+        mut batches: &[Batch],
+        hits: &mut Vec<Hit>,
+        tile: &mut [u64],
+    ) -> SplatCounters {
+        let mut counters = SplatCounters::default();
+        let mut last = Instant::now();
+        while !batches.is_empty() {
+            let taken = chunk(batches);
+            hits.clear();
+            let (projections, valid) = dispatch!(self.level, simd => self.work.run::<_, Pair<f32x16<_>>>(simd, taken, hits));
+            let projected = Instant::now();
+            splat_hits(hits, self.work.pass.shape, self.work.stride as usize, tile);
+            let done = Instant::now();
+            counters.projections += projections;
+            counters.valid += valid;
+            counters.project_ns += nanoseconds(last, projected);
+            counters.splat_ns += nanoseconds(projected, done);
+            last = done;
+            batches = &batches[taken.len()..];
+        }
+        counters
+    }
+}
+
+/// The first batches whose surfels make up at most a chunk; at least one.
+fn chunk(batches: &[Batch]) -> &[Batch] {
     let mut sum = 0;
     let fits = |b: &&Batch| {
         sum += b.count as usize;
         sum <= CHUNK
     };
-    let n = open.iter().take_while(fits).count();
-    &open[..n.max(1)]
+    let n = batches.iter().take_while(fits).count();
+    &batches[..n.max(1)]
 }
 
 fn fill_tile(tile: &mut Vec<u64>, patch: &Patch, visibility: &Visibility) {
@@ -193,6 +247,7 @@ fn splat_hits(hits: &[Hit], shape: SplatShape, stride: usize, tile: &mut [u64]) 
 }
 
 /// The projection of batches by one camera.
+#[derive(Clone, Copy)]
 pub(crate) struct Projection<'a> {
     pub(crate) pass: &'a SplatPass<'a>,
     pub(crate) surfels: &'a Surfels,
@@ -218,7 +273,7 @@ impl Projection<'_> {
         let zero = V::broadcast(simd, 0.0);
         let width = V::broadcast(simd, (self.stride - BORDER) as f32);
         let height = V::broadcast(simd, (self.patch.rect.height() + BORDER) as f32);
-        let (mut xs, mut ys, mut depths) = ([0.0; 16], [0.0; 16], [0.0; 16]);
+        let (mut xs, mut ys, mut depths) = ([0.0; 32], [0.0; 32], [0.0; 32]);
         for batch in batches {
             let lo = V::broadcast(simd, batch.lambda[0]);
             let hi = V::broadcast(simd, batch.lambda[1]);
@@ -240,7 +295,8 @@ impl Projection<'_> {
                 for image in project(&self.camera.camera, q, lo, hi).as_slice() {
                     let front = zero.lt(image.linear(self.camera.front)) & active;
                     let inside = image.within([EDGE_TOLERANCE; 3]) & front;
-                    seen |= V::bits(inside);
+                    let own = V::bits(inside);
+                    seen |= own;
                     let mut drawn = image.within(self.camera.guard) & front;
                     if self.pass.first_root_only {
                         drawn = drawn & !taken;
@@ -270,7 +326,9 @@ impl Projection<'_> {
                             reason = "see above"
                         )]
                         let slot = ys[l] as u32 * self.stride + xs[l] as u32;
-                        let key = u64::from(depths[l].to_bits()) << 32 | u64::from(at + lane);
+                        let guard = if own >> lane & 1 == 0 { GUARD } else { 0 };
+                        let key =
+                            u64::from(depths[l].to_bits()) << 32 | guard | u64::from(at + lane);
                         hits.push(Hit { key, slot });
                     }
                 }

@@ -10,8 +10,6 @@ pub struct Cubic<R> {
     pub c: [R; 4],
 }
 
-/// Newton stops a lane when its step is below this share of λ: the next one would be its square.
-const STEP_SHARE: f64 = 1.0 / (1 << 20) as f64;
 /// Enough for bisection alone to end at the precision of f32; a smooth piece takes two or three.
 const MAX_STEPS: usize = 24;
 
@@ -67,7 +65,7 @@ impl<R: Real> Cubic<R> {
     pub fn monotone_root(&self, lo: R, hi: R, closed: bool) -> (R, R::Mask) {
         let zero = lo.splat(R::Scalar::from_f64(0.0));
         let half = R::Scalar::from_f64(0.5);
-        let share = R::Scalar::from_f64(STEP_SHARE);
+        let share = R::Scalar::from_f64(R::Scalar::ROOT_EPSILON);
         let (f_lo, f_hi) = (self.value(lo), self.value(hi));
         let rising = f_lo.lt(zero) & zero.le(f_hi);
         let falling = zero.lt(f_lo) & f_hi.le(zero);

@@ -4,6 +4,8 @@ use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::super::FrameInput;
+use super::guard;
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
 use crate::camera::RayScale;
@@ -21,11 +23,6 @@ const CONTACT: f64 = 1e-5;
 /// λ ends at this many times the farthest object's distance over the shortest ray: rays interpolated much
 /// shorter than the three given ones are not followed further.
 const SHORTENING: f64 = 1e3;
-/// Largest guard as a weight: slivers on the screen would reach anywhere (untuned).
-const MAX_GUARD: f64 = 2.0;
-/// The guard of patches that reach behind the eye, where pixels are no measure.
-const GUARD_BEHIND_EYE: f64 = 0.25;
-
 /// What the cameras depend on besides the scene.
 #[derive(Clone, Copy)]
 pub(super) struct CameraSettings {
@@ -35,12 +32,11 @@ pub(super) struct CameraSettings {
 
 /// The cameras of all patches, by patch and object, and where each patch's begin.
 pub(super) fn cameras(
-    scene: &PreparedScene,
-    eye: &Eye,
+    frame: FrameInput<'_>,
     patches: &[Patch],
     settings: CameraSettings,
 ) -> (Vec<CameraInstance>, Vec<u32>) {
-    let top = Top::new(scene, eye);
+    let top = Top::new(frame.scene, frame.eye);
     let lists: Vec<Vec<CameraInstance>> = patches
         .par_chunks(32)
         .enumerate()
@@ -48,7 +44,7 @@ pub(super) fn cameras(
             let mut list = Vec::new();
             for (i, patch) in patches.iter().enumerate() {
                 let index = u32::try_from(chunk * 32 + i).expect("fewer patches than pixels");
-                of_patch(scene, eye, &top, patch, index, settings, &mut list);
+                of_patch(frame, &top, patch, index, settings, &mut list);
             }
             list
         })
@@ -94,14 +90,14 @@ impl Top {
 }
 
 fn of_patch(
-    scene: &PreparedScene,
-    eye: &Eye,
+    frame: FrameInput<'_>,
     top: &Top,
     patch: &Patch,
     index: u32,
     settings: CameraSettings,
     out: &mut Vec<CameraInstance>,
 ) {
+    let FrameInput { scene, eye, visibility } = frame;
     let mirror = scene.mirror_triangle(patch.triangle.0);
     let whole = Rays {
         origins: mirror.corners.map(|v| v.as_dvec3()),
@@ -116,7 +112,8 @@ fn of_patch(
     let facing = DVec3::from_array(mirror.facing(eye.position));
     let front = linear_form(patch.corners.map(|w| w.dot(facing)));
     let screen = screen_forms(eye, patch, rays.origins);
-    let guard = guard(eye, rays.origins, settings.shape);
+    let corners_px = rays.origins.map(|v| homogeneous(eye, v));
+    let guard = guard::guard(&corners_px, visibility, patch, settings.shape);
     let grown = rays.grown(guard);
     let volume = ViewVolume::<f32>::new(&grown);
     let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
@@ -192,25 +189,4 @@ fn screen_forms(eye: &Eye, patch: &Patch, corners: [DVec3; 3]) -> [[f32; 3]; 3] 
         linear_form(h.map(|h| h.y - top * h.z)),
         linear_form(h.map(|h| h.z)),
     ]
-}
-
-/// How far a splat's centre may lie outside the triangle and still cover one of its pixels, as weights: the
-/// footprint about a pixel's centre, seen along each edge's normal.
-fn guard(eye: &Eye, corners: [DVec3; 3], shape: SplatShape) -> DVec3 {
-    let reach_px = match shape {
-        SplatShape::Square1 => 0.5,
-        SplatShape::Square2 => 1.0,
-    };
-    let h = corners.map(|v| homogeneous(eye, v));
-    if h.iter().any(|h| h.z <= 0.0) {
-        return DVec3::splat(GUARD_BEHIND_EYE);
-    }
-    let s = h.map(|h| h.truncate() / h.z);
-    let area = (s[1] - s[0]).perp_dot(s[2] - s[0]).abs();
-    let of = |i: usize| {
-        // A square's support in the direction of the edge's normal, by the edge's length.
-        let edge = (s[(i + 2) % 3] - s[(i + 1) % 3]).abs();
-        (reach_px * (edge.x + edge.y) / area.max(f64::MIN_POSITIVE)).min(MAX_GUARD)
-    };
-    DVec3::new(of(0), of(1), of(2))
 }

@@ -1,7 +1,8 @@
 //! The hybrid method of Mei, Popescu & Sacks 2007: every visible mirror triangle is a continuous 3-ray camera,
 //! culled against the surfels' trees (backward), which then projects and splats what is left (forward).
 
-pub(crate) mod cameras;
+mod cameras;
+mod guard;
 
 use std::time::Instant;
 
@@ -104,7 +105,7 @@ impl Method for C3rc {
         let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
         let mut list = Vec::new();
         patches(frame.eye, frame.visibility, corners, &mut PatchScratch::default(), &mut list);
-        let (cameras, patch_cameras) = cameras::cameras(scene, frame.eye, &list, settings);
+        let (cameras, patch_cameras) = cameras::cameras(frame, &list, settings);
         out.times.cameras_ms = milliseconds(start);
         let test = match params.choice("test") {
             "none" => BoxTest::None,

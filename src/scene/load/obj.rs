@@ -14,6 +14,7 @@ use super::{GET_IT_AGAIN, REPAIR, REPORT_EVERY, STAGE, defect, linear_from_srgb,
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
+use crate::geometry::mesh::MAX_COORDINATE;
 
 const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
     single_index: true,
@@ -169,7 +170,11 @@ impl Source<'_> {
         };
         for (i, word) in words.enumerate() {
             match word.parse::<f32>() {
-                Ok(number) if number.is_finite() => {}
+                Ok(number) if number.abs() <= MAX_COORDINATE => {}
+                // The mesh would name another vertex: `tobj` numbers them in the order of the faces.
+                Ok(number) if number.is_finite() => {
+                    return Err((format!("{word} is larger than {MAX_COORDINATE:e}"), REPAIR));
+                }
                 Ok(_) => return Err((format!("\"{word}\" is not a finite number"), REPAIR)),
                 Err(_) => return Err((format!("\"{word}\" is not a number"), REPAIR)),
             }

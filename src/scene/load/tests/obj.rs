@@ -60,6 +60,7 @@ fn bad_obj() {
         ("v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "line 2: \"nan\" is not a finite number"),
         ("v 0 0 -inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1: \"-inf\" is not a finite number"),
         ("v 0 0 1e39\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1: \"1e39\" is not a finite number"),
+        ("v 0 0 0\nv 2e15 0 0\nv 0 1 0\nf 1 3 2\n", "line 2: 2e15 is larger than 1e15"),
         ("v 0 0 0 r 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1: \"r\" is not a number"),
         ("v 0 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1: scaling (w) by zero"),
         ("v 0 0 0\nv 1 0 0\nv 0 1\nf 1 2 3\n", "line 3: has 2 numbers after \"v\""),

@@ -1,0 +1,67 @@
+//! Plans: every pass finds what it reads.
+
+use catoptric::Context;
+use catoptric::backend::{Backend, cpu::Cpu, cpu::finish};
+use catoptric::geometry::Similarity;
+use catoptric::methods::{FrameInput, METHODS, Params};
+use catoptric::plan::{Plan, Reflection, Resource};
+use catoptric::visibility::{Scratch, Visibility};
+use glam::DVec3;
+
+use super::{RED, eye, looks, moved, object, prepared, scene, shape};
+
+/// Does something with each method's plan for a small scene.
+fn with_plans(mut see: impl FnMut(&str, Plan, &catoptric::scene::PreparedScene, &Visibility)) {
+    let cube = object("cube", shape("cube", 12), moved(DVec3::new(0.8, 0.0, 0.8)), RED);
+    let mirror = (shape("sphere", 500), Similarity::IDENTITY);
+    let looks = looks(DVec3::new(0.0, 1.0, 3.0), DVec3::ZERO);
+    let scene = prepared(&scene(mirror, vec![cube], looks), 2000);
+    let eye = eye(&scene, 64, 36);
+    let mut visibility = Visibility::default();
+    let (mirrors, objects) = (finish::mirror_surfaces(&scene), finish::object_surfaces(&scene));
+    visibility.update(&eye, &mirrors, &objects, &mut Scratch::default());
+    for method in METHODS {
+        let params = Params::defaults(method.info().params);
+        let made = method.prepare(&scene, &params, &Context::default()).unwrap();
+        let mut plan = Plan::default();
+        let input = FrameInput { scene: &scene, eye: &eye, visibility: &visibility };
+        method.plan(input, &made, &params, &mut plan).unwrap();
+        see(method.info().id, plan, &scene, &visibility);
+    }
+}
+
+#[test]
+fn every_pass_finds_what_it_reads() {
+    let mut seen = 0;
+    with_plans(|id, plan, _, _| {
+        assert_eq!(plan.missing_resource(), None, "{id}");
+        let last = plan.passes.last().unwrap();
+        assert!(last.writes().contains(&Resource::Reflection), "{id} ends without a reflection");
+        seen += 1;
+    });
+    assert_eq!(seen, METHODS.len());
+}
+
+#[test]
+fn swapped_and_lost_passes_are_found_out() {
+    let mut swapped = 0;
+    with_plans(|id, mut plan, scene, visibility| {
+        if plan.passes.len() < 2 {
+            return;
+        }
+        plan.passes.swap(0, 1);
+        assert_eq!(plan.missing_resource(), Some(Resource::Keys), "{id}");
+        let execute = || {
+            let out = &mut Reflection::default();
+            Cpu::default().execute(&plan, scene, visibility, false, out).map(|_| ())
+        };
+        let refused = std::panic::catch_unwind(std::panic::AssertUnwindSafe(execute)).unwrap_err();
+        let message = refused.downcast_ref::<String>().unwrap();
+        assert!(message.contains("out of order"), "{id}: {message}");
+        plan.passes.swap(0, 1);
+        plan.passes.remove(0);
+        assert_eq!(plan.missing_resource(), Some(Resource::Keys), "{id}");
+        swapped += 1;
+    });
+    assert!(swapped > 0, "no method has two passes");
+}
