@@ -100,15 +100,17 @@ fn of_patch(
                 images: 0,
             };
             let [lo, hi] = camera.lambda;
+            let mut least = f32::INFINITY;
             for image in project(&camera.camera, q.to_array(), lo, hi).as_slice() {
                 if !image.found || image.linear(camera.front) <= 0.0 {
                     continue;
                 }
                 seen.images += u32::from(image.within([super::splat::EDGE_TOLERANCE; 3]));
-                // The batch's narrower λ range may have led Newton to a neighbour of this float.
-                let other = work.depth(image);
-                let near = (other - f32::from_bits(depth)).abs() <= 1e-4 * other.abs();
-                if near && image.within(camera.guard) {
+                // The key's depth may carry the spread of its splat, and Newton in the batch's narrower λ range
+                // may have ended on a neighbouring float: the nearest in depth is the one.
+                let apart = (work.depth(image) - f32::from_bits(depth)).abs();
+                if apart < least && image.within(camera.guard) {
+                    least = apart;
                     let [x, y, _] = work.place(image, 0.0);
                     seen.lambda = image.lambda;
                     seen.splat = [x + patch.rect.min[0] as f32, y + patch.rect.min[1] as f32];
