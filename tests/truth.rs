@@ -15,6 +15,11 @@ use glam::{DVec3, Vec3};
 
 const SIZE: ImageSize = ImageSize { width: 1280, height: 720 };
 
+#[expect(clippy::cast_possible_truncation, reason = "a tolerance")]
+fn narrow(x: f64) -> f32 {
+    x as f32
+}
+
 /// How the splatted reflection stands against the ray-traced one.
 #[derive(Debug)]
 struct Truth {
@@ -59,7 +64,7 @@ fn compare(scene: &PreparedScene, ours: &Planes, reference: &Planes) -> Truth {
         .iter()
         .map(|o| {
             let area = o.mesh.area() * o.to_scene.scale.powi(2);
-            2.0 * (area / o.surfels.len() as f64).sqrt() as f32
+            2.0 * narrow((area / o.surfels.len() as f64).sqrt())
         })
         .collect();
     let (mut inner, mut covered, mut placed, mut extra, mut mirror) = (0, 0, 0, 0, 0);
