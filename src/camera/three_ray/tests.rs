@@ -373,3 +373,42 @@ fn bounds_a_lambda_range() {
         assert!(!volume.meets::<f64>(test, &aside, 0.0, 100.0).2, "{test:?}");
     }
 }
+
+/// The solver against the bracketed method of Brent in the `roots` crate, on the same monotone pieces, and no root
+/// missed where F changes sign.
+#[test]
+fn roots_agree_with_brent() {
+    let mut numbers = Numbers(6);
+    let mut compared = 0;
+    for _ in 0..20_000 {
+        let rays = numbers.camera(0.4, RayScale::EyeDistance);
+        let (w, lambda) = (numbers.weights(), numbers.between(0.0, 3.0));
+        let (v, d) = rays.at(w);
+        let camera = ThreeRay::<f64>::new(&rays, &rays);
+        let q = (v + d * lambda - rays.origins[0]).to_array();
+        let cubic = camera.cubic::<f64>(q);
+        let (lo, hi) = (0.0, 8.0);
+        let found = cubic.roots_between(lo, hi);
+        let found: Vec<f64> =
+            found.root[..found.count].iter().filter(|r| r.1).map(|r| r.0).collect();
+        let [p, q] = cubic.critical_points(lo, hi);
+        let mut expected = Vec::new();
+        for (from, to) in [(lo, p), (p, q), (q, hi)] {
+            if cubic.value(from) * cubic.value(to) < 0.0 {
+                let f = |x: f64| cubic.value(x);
+                let root = roots::find_root_brent(from, to, f, &mut 1e-10f64);
+                expected.push(root.expect("the sign changes"));
+            }
+        }
+        let scale = cubic.c.iter().fold(0.0f64, |m, c| m.max(c.abs()));
+        for root in &expected {
+            let near = found
+                .iter()
+                .any(|x| (x - root).abs() < 1e-6 || cubic.value(*x).abs() < 1e-13 * scale);
+            assert!(near, "{root} is not among {found:?}");
+            compared += 1;
+        }
+        assert!(found.len() >= expected.len());
+    }
+    assert!(compared > 15_000);
+}

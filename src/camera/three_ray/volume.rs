@@ -1,7 +1,7 @@
 //! Which boxes meet a view volume: several tests, written once over lanes (a lane is a box).
 //!
 //! All but [`BoxTest::Paper`] are conservative: a box that contains a point with an image is never refused.
-//! Rounding goes outward by [`ROUNDING`].
+//! Rounding goes outward.
 
 use glam::DVec3;
 
