@@ -90,8 +90,7 @@ const ROOT_MARGIN: f32 = 1e-6;
 const WIDTH_EXPONENT: i32 = 10;
 
 impl TriangleBvh {
-    /// Builds the tree with all threads of the current rayon pool: half a second for 871,414 triangles on two
-    /// cores. There may be none at all.
+    /// Builds the tree with all threads of the current rayon pool. There may be none at all.
     ///
     /// # Panics
     /// If there are more than 2³² - 1 triangles.

@@ -52,7 +52,7 @@ pub(crate) struct SceneArgs {
     /// Surfels over all objects
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SURFELS, allow_negative_numbers = true)]
     surfels: usize,
-    /// Surfels a tree leaf holds at most (default 16; 122 with --preset paper)
+    /// Surfels a tree leaf holds at most (default 8; 122 with --preset paper)
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     leaf: Option<u32>,
     /// Tree nodes of at most this share of their object's size are leaves
@@ -172,9 +172,7 @@ impl SceneArgs {
 
 /// The scene's own eye for a picture size.
 fn eye_of(scene: &PreparedScene, size: ImageSize) -> Result<Eye> {
-    let e = scene.eye;
-    let (position, target) = (e.position - scene.origin, e.target - scene.origin);
-    Eye::new(position, target, e.up, e.fov_y, size).ok_or_else(|| {
+    scene.eye_for(size).ok_or_else(|| {
         Error::input(
             "--eye, --target, --fov",
             "",

