@@ -60,7 +60,7 @@ struct Walk<'a> {
     first: u32,
 }
 
-/// A subtree or leaf that may meet the volume.
+/// A subtree that may meet the volume; `child` = 0: to be taken whole.
 #[derive(Clone, Copy, Default)]
 struct Open {
     child: u32,
@@ -81,17 +81,18 @@ impl Walk<'_> {
         let mut lambda = self.lambda;
         let from = out.len();
         loop {
-            let (lo, hi, mut bits) = test_children(simd, node, self.volume, self.test, lambda);
-            bits &= node.used;
+            let tested = test_children(simd, node, self.volume, self.test, lambda);
+            let mut bits = tested.meets & node.used;
             // The last child first, so that leaves come out in surfel order.
             while bits != 0 {
                 let slot = 63 - bits.leading_zeros() as usize;
                 bits ^= 1 << slot;
+                let inside = tested.inside >> slot & 1 != 0;
                 stack[top] = Open {
-                    child: node.child[slot],
+                    child: if inside { 0 } else { node.child[slot] },
                     first: self.first + node.first[slot],
                     count: node.count[slot],
-                    lambda: [lo[slot], hi[slot]],
+                    lambda: [tested.lo[slot], tested.hi[slot]],
                 };
                 top += 1;
             }
@@ -124,7 +125,17 @@ impl Walk<'_> {
     }
 }
 
-/// Tests the eight boxes of a node: what is left of the λ range for each, and bit i where box i may meet.
+/// What a test says of the eight boxes of a node.
+pub(crate) struct Tested {
+    pub(crate) lo: [f32; CHILDREN],
+    pub(crate) hi: [f32; CHILDREN],
+    /// Bit i: box i may meet the volume.
+    pub(crate) meets: u64,
+    /// Bit i: box i lies inside it.
+    pub(crate) inside: u64,
+}
+
+/// Tests the eight boxes of a node.
 #[inline(always)]
 pub(crate) fn test_children<S: Simd>(
     simd: S,
@@ -132,7 +143,7 @@ pub(crate) fn test_children<S: Simd>(
     volume: &ViewVolume<f32>,
     test: BoxTest,
     lambda: [f32; 2],
-) -> ([f32; CHILDREN], [f32; CHILDREN], u64) {
+) -> Tested {
     type V<S> = f32x8<S>;
     let origin = volume.origin();
     let boxes = Boxes {
@@ -148,9 +159,14 @@ pub(crate) fn test_children<S: Simd>(
         ],
     };
     let (lo, hi) = (V::broadcast(simd, lambda[0]), V::broadcast(simd, lambda[1]));
-    let (lo, hi, meets) = volume.meets(test, &boxes, lo, hi);
-    let (mut los, mut his) = ([0.0; CHILDREN], [0.0; CHILDREN]);
-    lo.store(&mut los);
-    hi.store(&mut his);
-    (los, his, V::<S>::bits(meets))
+    let verdict = volume.meets(test, &boxes, lo, hi);
+    let mut tested = Tested {
+        lo: [0.0; CHILDREN],
+        hi: [0.0; CHILDREN],
+        meets: V::<S>::bits(verdict.meets),
+        inside: V::<S>::bits(verdict.inside),
+    };
+    verdict.lo.store(&mut tested.lo);
+    verdict.hi.store(&mut tested.hi);
+    tested
 }

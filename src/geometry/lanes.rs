@@ -4,7 +4,7 @@
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-use fearless_simd::{Level, Select, Simd, SimdBase, SimdFloat, SimdFrom, SimdMask, f32x8, f32x16};
+use fearless_simd::{Level, Select, Simd, SimdBase, SimdFloat, SimdFrom, SimdMask, f32x8, f32x16, u32x8, u32x16};
 
 /// A scalar that camera constants are stored in.
 pub trait Scalar:
@@ -146,10 +146,18 @@ pub trait Vector<S: Simd>: Real<Scalar = f32> {
     fn bits(mask: Self::Mask) -> u64;
     /// Lane i = bit i.
     fn mask(simd: S, bits: u64) -> Self::Mask;
+    /// The lanes of `mask`, in order, into the front of `out`, which has room for `LANES`; what lies behind them is
+    /// overwritten.
+    fn compress(self, mask: Self::Mask, out: &mut [f32]);
+    /// [`Vector::compress`] of the numbers `first`, `first` + 1, ...
+    fn compress_numbers(simd: S, first: u32, mask: Self::Mask, out: &mut [u32]);
+    /// [`Vector::compress`] of `4 (⌊y⌋ stride + ⌊x⌋) + quarter`: the cell of a grid that holds the point, and which
+    /// quarter of the cell, row by row. Where the mask holds, x and y must be in 0 to 2^30 and the result in u32.
+    fn compress_cells(x: Self, y: Self, stride: u32, mask: Self::Mask, out: &mut [u32]);
 }
 
 macro_rules! vector_real {
-    ($t:ident, $n:literal) => {
+    ($t:ident, $u:ident, $n:literal) => {
         impl<S: Simd> Real for $t<S> {
             type Scalar = f32;
             type Mask = <Self as SimdBase<S>>::Mask;
@@ -205,11 +213,29 @@ macro_rules! vector_real {
             fn mask(simd: S, bits: u64) -> Self::Mask {
                 <Self::Mask as SimdMask<S>>::from_bitmask(simd, bits)
             }
+            #[inline(always)]
+            fn compress(self, mask: Self::Mask, out: &mut [f32]) {
+                SimdBase::compress(self, mask).store_slice(&mut out[..$n]);
+            }
+            #[inline(always)]
+            fn compress_numbers(simd: S, first: u32, mask: Self::Mask, out: &mut [u32]) {
+                let numbers = $u::from_slice(simd, &COUNTING[..$n]) + first;
+                SimdBase::compress(numbers, mask).store_slice(&mut out[..$n]);
+            }
+            #[inline(always)]
+            fn compress_cells(x: Self, y: Self, stride: u32, mask: Self::Mask, out: &mut [u32]) {
+                let (x, y): ($u<S>, $u<S>) = ((x + x).to_int(), (y + y).to_int());
+                let cell = (y >> 1) * stride + (x >> 1);
+                let cells = (cell << 2) | ((y & 1) << 1) | (x & 1);
+                SimdBase::compress(cells, mask).store_slice(&mut out[..$n]);
+            }
         }
     };
 }
-vector_real!(f32x8, 8);
-vector_real!(f32x16, 16);
+vector_real!(f32x8, u32x8, 8);
+vector_real!(f32x16, u32x16, 16);
+
+const COUNTING: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Two vectors side by side: a kernel whose operations wait for each other runs two chains at once.
 #[derive(Clone, Copy, Debug)]
@@ -337,6 +363,23 @@ impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
     #[inline(always)]
     fn mask(simd: S, bits: u64) -> Self::Mask {
         PairMask(V::mask(simd, bits), V::mask(simd, bits >> V::LANES))
+    }
+    #[inline(always)]
+    fn compress(self, mask: Self::Mask, out: &mut [f32]) {
+        self.0.compress(mask.0, out);
+        self.1.compress(mask.1, &mut out[V::bits(mask.0).count_ones() as usize..]);
+    }
+    #[inline(always)]
+    fn compress_numbers(simd: S, first: u32, mask: Self::Mask, out: &mut [u32]) {
+        V::compress_numbers(simd, first, mask.0, out);
+        let out = &mut out[V::bits(mask.0).count_ones() as usize..];
+        V::compress_numbers(simd, first.wrapping_add(V::LANES), mask.1, out);
+    }
+    #[inline(always)]
+    fn compress_cells(x: Self, y: Self, stride: u32, mask: Self::Mask, out: &mut [u32]) {
+        V::compress_cells(x.0, y.0, stride, mask.0, out);
+        let out = &mut out[V::bits(mask.0).count_ones() as usize..];
+        V::compress_cells(x.1, y.1, stride, mask.1, out);
     }
 }
 

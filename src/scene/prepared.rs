@@ -84,6 +84,8 @@ pub struct PreparedObject {
     pub tree: KdTree,
     /// Its part of the scene's surfels.
     pub surfels: Range<u32>,
+    /// Largest radius that one of its surfels stands for, object space; infinite if that is not known.
+    pub extent: f32,
     /// Contains its surfels, scene space.
     pub bounds: Aabb,
     /// Index of its first triangle over all objects.
@@ -187,6 +189,8 @@ impl PreparedScene {
             cx.step("building trees", objects.len() as f64 / scene.objects.len() as f64)?;
             let tree = KdTree::build(&mut own, limits);
             let first = index(surfels.len());
+            let known = |e: f32| if e > 0.0 { e } else { f32::INFINITY };
+            let extent = own.extent.iter().copied().map(known).fold(0.0, f32::max);
             append(&mut surfels, own);
             objects.push(PreparedObject {
                 name: object.name.clone(),
@@ -196,6 +200,7 @@ impl PreparedScene {
                 positions: Vec::new(),
                 tree,
                 surfels: first..index(surfels.len()),
+                extent,
                 bounds: Aabb::EMPTY,
                 first_triangle,
             });

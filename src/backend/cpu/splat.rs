@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::pool::Pool;
 use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
+use crate::geometry::surfel::PADDING;
 use crate::geometry::lanes::{Pair, Real, Vector, dot, simd_level};
 use crate::plan::{Batch, CameraInstance, DepthKey, SplatPass, SplatShape};
 use crate::visibility::{NONE_ID, Patch, Visibility};
@@ -29,6 +30,8 @@ const SPREAD: u64 = 1 << (32 + 20);
 pub(crate) const EDGE_TOLERANCE: f32 = 1e-3;
 /// Surfels projected at a time before they are splatted.
 const CHUNK: usize = 2048;
+/// Of a surfel in a camera.
+const MAX_IMAGES: usize = 3;
 /// A camera with more surfels than this shares them with idle threads (untuned).
 const SHARE: usize = 1 << 15;
 /// One column and row around the tile takes what a 2 × 2 splat writes beyond it.
@@ -68,17 +71,32 @@ impl SplatCounters {
 #[derive(Default)]
 pub(crate) struct Scratch {
     batches: Vec<Batch>,
-    hits: Vec<Hit>,
+    hits: Hits,
     tile: Vec<u64>,
 }
 
-/// A drawn image: its key and the tile slot of its splat's first pixel.
-#[derive(Clone, Copy)]
-struct Hit {
-    key: u64,
-    slot: u32,
-    /// Which of the splat's 2 × 2 pixels the image falls on, row by row.
-    own: u32,
+/// Drawn images.
+#[derive(Default)]
+struct Hits {
+    /// Tile slot of the splat's first pixel, and which of its 2 × 2 pixels the image falls on (see
+    /// [`Vector::compress_cells`]).
+    cell: Vec<u32>,
+    /// Of an image outside the triangle: its negative.
+    depth: Vec<f32>,
+    surfel: Vec<u32>,
+    len: usize,
+}
+
+impl Hits {
+    /// Empties it and makes room.
+    fn clear(&mut self, room: usize) {
+        self.len = 0;
+        if self.cell.len() < room {
+            self.cell.resize(room, 0);
+            self.depth.resize(room, 0.0);
+            self.surfel.resize(room, 0);
+        }
+    }
 }
 
 /// Runs the pass: the nearest key of every pixel of `visibility` that is a mirror's goes into `keys`.
@@ -160,7 +178,7 @@ impl Shared<'_> {
     fn project(
         &self,
         batches: &[Batch],
-        hits: &mut Vec<Hit>,
+        hits: &mut Hits,
         tile: &mut Vec<u64>,
     ) -> SplatCounters {
         let surfels: usize = batches.iter().map(|b| b.count as usize).sum();
@@ -186,14 +204,14 @@ impl Shared<'_> {
     fn project_in_turn(
         &self,
         mut batches: &[Batch],
-        hits: &mut Vec<Hit>,
+        hits: &mut Hits,
         tile: &mut [u64],
     ) -> SplatCounters {
         let mut counters = SplatCounters::default();
         let mut last = Instant::now();
         while !batches.is_empty() {
             let taken = chunk(batches);
-            hits.clear();
+            hits.clear(MAX_IMAGES * taken.iter().map(|b| b.count as usize).sum::<usize>() + PADDING);
             let (projections, valid) = dispatch!(self.level, simd => self.work.run::<_, Pair<f32x16<_>>>(simd, taken, hits));
             let projected = Instant::now();
             splat_hits(hits, self.work.pass.shape, self.work.stride as usize, tile);
@@ -236,16 +254,20 @@ fn fill_tile(tile: &mut Vec<u64>, patch: &Patch, visibility: &Visibility) {
     }
 }
 
-fn splat_hits(hits: &[Hit], shape: SplatShape, stride: usize, tile: &mut [u64]) {
-    for hit in hits {
-        let slot = hit.slot as usize;
+fn splat_hits(hits: &Hits, shape: SplatShape, stride: usize, tile: &mut [u64]) {
+    let n = hits.len;
+    let hits = hits.cell[..n].iter().zip(&hits.depth[..n]).zip(&hits.surfel[..n]);
+    for ((&cell, &depth), &surfel) in hits {
+        // The sign bit of the depth is GUARD.
+        let key = u64::from(depth.to_bits()) << 32 | u64::from(surfel);
+        let slot = (cell >> 2) as usize;
         match shape {
-            SplatShape::Square1 => tile[slot] = tile[slot].min(hit.key),
+            SplatShape::Square1 => tile[slot] = tile[slot].min(key),
             SplatShape::Square2 => {
                 let block = &mut tile[slot..slot + stride + 2];
                 for (corner, i) in [0, 1, stride, stride + 1].into_iter().enumerate() {
-                    let bias = if hit.own as usize == corner { 0 } else { SPREAD };
-                    block[i] = block[i].min(hit.key + bias);
+                    let bias = if (cell & 3) as usize == corner { 0 } else { SPREAD };
+                    block[i] = block[i].min(key + bias);
                 }
             }
         }
@@ -269,7 +291,7 @@ impl Projection<'_> {
         &self,
         simd: S,
         batches: &[Batch],
-        hits: &mut Vec<Hit>,
+        hits: &mut Hits,
     ) -> (u64, u64) {
         let (mut projections, mut valid) = (0, 0);
         let offset = match self.pass.shape {
@@ -279,7 +301,7 @@ impl Projection<'_> {
         let zero = V::broadcast(simd, 0.0);
         let width = V::broadcast(simd, (self.stride - BORDER) as f32);
         let height = V::broadcast(simd, (self.patch.rect.height() + BORDER) as f32);
-        let (mut xs, mut ys, mut depths) = ([0.0; 32], [0.0; 32], [0.0; 32]);
+        let mut len = 0;
         for batch in batches {
             let lo = V::broadcast(simd, batch.lambda[0]);
             let hi = V::broadcast(simd, batch.lambda[1]);
@@ -301,8 +323,7 @@ impl Projection<'_> {
                 for image in project(&self.camera.camera, q, lo, hi).as_slice() {
                     let front = zero.lt(image.linear(self.camera.front)) & active;
                     let inside = image.within([EDGE_TOLERANCE; 3]) & front;
-                    let own = V::bits(inside);
-                    seen |= own;
+                    seen |= V::bits(inside);
                     let mut drawn = image.within(self.camera.guard) & front;
                     if self.pass.first_root_only {
                         drawn = drawn & !taken;
@@ -314,38 +335,19 @@ impl Projection<'_> {
                     let [x, y, lands] = self.place(image, offset);
                     let lands =
                         zero.lt(lands) & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
-                    let mut bits = V::bits(drawn & lands);
-                    if bits == 0 {
-                        continue;
-                    }
-                    x.store(&mut xs);
-                    y.store(&mut ys);
-                    self.depth(image).store(&mut depths);
-                    while bits != 0 {
-                        let lane = bits.trailing_zeros();
-                        bits &= bits - 1;
-                        let l = lane as usize;
-                        // Not negative and less than the tile's size: the cast truncates, which is floor here.
-                        #[expect(
-                            clippy::cast_possible_truncation,
-                            clippy::cast_sign_loss,
-                            reason = "see above"
-                        )]
-                        let (x, y) = (xs[l] as u32, ys[l] as u32);
-                        let slot = y * self.stride + x;
-                        let right = xs[l] - x as f32 >= 0.5;
-                        let below = ys[l] - y as f32 >= 0.5;
-                        let own_pixel = u32::from(right) + 2 * u32::from(below);
-                        let guard = if own >> lane & 1 == 0 { GUARD } else { 0 };
-                        let key =
-                            u64::from(depths[l].to_bits()) << 32 | guard | u64::from(at + lane);
-                        hits.push(Hit { key, slot, own: own_pixel });
-                    }
+                    let lands = drawn & lands;
+                    let depth = self.depth(image);
+                    V::compress_cells(x, y, self.stride, lands, &mut hits.cell[len..]);
+                    let signed = V::select(inside, depth, -depth);
+                    signed.compress(lands, &mut hits.depth[len..]);
+                    V::compress_numbers(simd, at, lands, &mut hits.surfel[len..]);
+                    len += V::bits(lands).count_ones() as usize;
                 }
                 valid += u64::from(seen.count_ones());
                 at += lanes;
             }
         }
+        hits.len = len;
         (projections, valid)
     }
 

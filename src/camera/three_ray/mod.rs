@@ -18,7 +18,7 @@ use crate::geometry::lanes::Scalar;
 
 pub use super::mirror_ray::RayScale;
 pub use project::{Image, project};
-pub use volume::{BoxTest, Boxes, ViewVolume};
+pub use volume::{BoxTest, Boxes, Verdict, ViewVolume};
 
 /// The three construction rays, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]

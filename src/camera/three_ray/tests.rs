@@ -341,7 +341,7 @@ fn refused<S: Simd>(
         half: [0, 1, 2].map(|k| f32x8::load(simd, &half[k])),
     };
     let (lo, hi) = (f32x8::broadcast(simd, 0.0), f32x8::broadcast(simd, 1e3));
-    let (_, _, meets) = volume.meets(test, &boxes, lo, hi);
+    let meets = volume.meets(test, &boxes, lo, hi).meets;
     8 - f32x8::bits(meets).count_ones() as usize
 }
 
@@ -364,7 +364,7 @@ fn bounds_a_lambda_range() {
     let volume = ViewVolume::<f64>::new(&rays);
     let boxes = Boxes::<f64> { center: [0.1, 0.1, 2.5], half: [0.01, 0.01, 0.5] };
     for test in [BoxTest::Interval, BoxTest::Sweep, BoxTest::Slab] {
-        let (lo, hi, meets): (f64, f64, bool) = volume.meets(test, &boxes, 0.0, 100.0);
+        let Verdict { lo, hi, meets, .. } = volume.meets(test, &boxes, 0.0, 100.0);
         assert!(
             meets && (1.9..=2.0).contains(&lo) && (3.0..=3.1).contains(&hi),
             "{test:?} {lo} {hi}"

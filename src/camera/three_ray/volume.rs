@@ -58,6 +58,27 @@ pub struct ViewVolume<T> {
     walls: [Direction<T>; 3],
 }
 
+/// What a test says of boxes.
+#[derive(Clone, Copy)]
+pub struct Verdict<R: Real> {
+    /// Start of the λ range in which the box may meet the volume.
+    pub lo: R,
+    /// End of it.
+    pub hi: R,
+    /// Lanes whose box may meet the volume.
+    pub meets: R::Mask,
+    /// Lanes whose box lies inside it but for rounding and for λ: testing its parts refuses none. A test may find
+    /// no such box.
+    pub inside: R::Mask,
+}
+
+impl<R: Real> Verdict<R> {
+    #[inline(always)]
+    pub(super) fn not_inside(lo: R, hi: R, meets: R::Mask) -> Self {
+        Self { lo, hi, meets, inside: meets & !meets }
+    }
+}
+
 /// Margin for the rounding of an inequality, as a share of its largest term: eight roundings of f32.
 const ROUNDING: f64 = 1e-6;
 /// Where the fixed walls of the sweep test touch the volume, as λ (untuned).
@@ -159,13 +180,16 @@ impl<T: Scalar> ViewVolume<T> {
         boxes: &Boxes<R>,
         lo: R,
         hi: R,
-    ) -> (R, R, R::Mask) {
+    ) -> Verdict<R> {
         match test {
-            BoxTest::None => (lo, hi, lo.le(hi)),
+            BoxTest::None => Verdict::not_inside(lo, hi, lo.le(hi)),
             BoxTest::Interval => self.sweep(boxes, lo, hi, false),
             BoxTest::Sweep => self.sweep(boxes, lo, hi, true),
             BoxTest::Slab => self.slab(boxes, lo, hi),
-            BoxTest::Paper => super::paper_test::meets(&self.v, &self.d, boxes, lo, hi),
+            BoxTest::Paper => {
+                let (lo, hi, meets) = super::paper_test::meets(&self.v, &self.d, boxes, lo, hi);
+                Verdict::not_inside(lo, hi, meets)
+            }
         }
     }
 
@@ -176,7 +200,7 @@ impl<T: Scalar> ViewVolume<T> {
         lo: R,
         hi: R,
         walls: bool,
-    ) -> (R, R, R::Mask) {
+    ) -> Verdict<R> {
         let (mut lo, mut hi) = (lo, hi);
         if walls {
             (lo, hi) = self.axis.trim(boxes, lo, hi);
@@ -189,11 +213,11 @@ impl<T: Scalar> ViewVolume<T> {
                 (lo, hi) = direction.trim(boxes, lo, hi);
             }
         }
-        (lo, hi, lo.le(hi))
+        Verdict::not_inside(lo, hi, lo.le(hi))
     }
 
     #[inline(always)]
-    fn slab<R: Real<Scalar = T>>(&self, boxes: &Boxes<R>, lo: R, hi: R) -> (R, R, R::Mask) {
+    fn slab<R: Real<Scalar = T>>(&self, boxes: &Boxes<R>, lo: R, hi: R) -> Verdict<R> {
         let (lo, hi) = self.axis.trim(boxes, lo, hi);
         let share = T::from_f64(ROUNDING);
         let mut alive = lo.le(hi);
@@ -211,11 +235,12 @@ impl<T: Scalar> ViewVolume<T> {
             alive = alive & (c - h).le(high + margin) & low.le(c + h + margin);
         }
         if !R::any(alive) {
-            return (lo, hi, alive);
+            return Verdict::not_inside(lo, hi, alive);
         }
+        let mut inside = alive;
         let mid = (lo + hi) * T::from_f64(0.5);
         let at_mid = [self.corner(0, mid), self.corner(1, mid), self.corner(2, mid)];
-        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
             let along = [
                 mid.splat(self.d[i][0] + self.d[j][0]),
                 mid.splat(self.d[i][1] + self.d[j][1]),
@@ -229,8 +254,10 @@ impl<T: Scalar> ViewVolume<T> {
             let n = cross(edge, along);
             let p = [dot(near[0], n), dot(near[1], n), dot(near[2], n)];
             let q = [dot(far[0], n), dot(far[1], n), dot(far[2], n)];
-            let high = p[0].max(p[1]).max(p[2]).max(q[0]).max(q[1]).max(q[2]);
-            let low = p[0].min(p[1]).min(p[2]).min(q[0]).min(q[1]).min(q[2]);
+            let wall_high = p[i].max(p[j]).max(q[i]).max(q[j]);
+            let wall_low = p[i].min(p[j]).min(q[i]).min(q[j]);
+            let high = wall_high.max(p[k]).max(q[k]);
+            let low = wall_low.min(p[k]).min(q[k]);
             let sizes = [n[0].abs(), n[1].abs(), n[2].abs()];
             let half = dot(boxes.half, sizes);
             // Every term is at most `size / share` times the normal's largest component.
@@ -239,8 +266,11 @@ impl<T: Scalar> ViewVolume<T> {
             // Refused only where the comparison holds: a NaN from an overflow refuses nothing.
             let outside = (high + margin).lt(middle - half) | (middle + half).lt(low - margin);
             alive = alive & !outside;
+            let upward = (p[i] + q[i]).lt(p[k] + q[k]);
+            let above = upward & wall_high.le(middle - half);
+            inside = inside & (above | (!upward & (middle + half).le(wall_low)));
         }
-        (lo, hi, alive)
+        Verdict { lo, hi, meets: alive, inside }
     }
 
     /// v_i + λ d_i.

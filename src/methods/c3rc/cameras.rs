@@ -5,7 +5,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::super::FrameInput;
-use super::guard;
+use super::guard::Guard;
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
 use crate::camera::RayScale;
@@ -113,8 +113,8 @@ fn of_patch(
     let front = linear_form(patch.corners.map(|w| w.dot(facing)));
     let screen = screen_forms(eye, patch, rays.origins);
     let corners_px = rays.origins.map(|v| homogeneous(eye, v));
-    let guard = guard::guard(&corners_px, visibility, patch, settings.shape);
-    let grown = rays.grown(guard);
+    let guard = Guard::new(&corners_px, visibility, patch, settings.shape);
+    let grown = rays.grown(guard.most());
     let volume = ViewVolume::<f32>::new(&grown);
     let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
     let size = rays.origins.map(|v| (v - position).length());
@@ -125,16 +125,18 @@ fn of_patch(
         (SHORTENING * (top.reach + farthest) / shortest) as f32,
     ];
     for (g, group) in top.groups.iter().enumerate() {
-        let (lo, hi, mut bits) = dispatch!(top.level, simd => test_children(simd, group, &volume, BoxTest::Slab, lambda));
-        bits &= group.used;
+        let tested = dispatch!(top.level, simd => test_children(simd, group, &volume, BoxTest::Slab, lambda));
+        let mut bits = tested.meets & group.used;
         while bits != 0 {
             let slot = bits.trailing_zeros() as usize;
             bits &= bits - 1;
             let object = g * CHILDREN + slot;
             let to_scene = &scene.objects[object].to_scene;
             let own = rays_in(to_scene, &rays);
-            let own_grown = rays_in(to_scene, &grown);
-            let range = [lo[slot], hi[slot]];
+            let range = [tested.lo[slot], tested.hi[slot]];
+            let extent = f64::from(scene.objects[object].extent);
+            let guard = guard.holding(extent, &own, range.map(f64::from));
+            let own_grown = own.grown(guard);
             let several = mixed_sign_range(&own_grown, range[0].into(), range[1].into());
             let from_eye =
                 rays.origins.map(|v| to_scene.inverse_direction(v - position) / to_scene.scale);
