@@ -22,6 +22,10 @@ pub struct CameraInstance {
     pub scale: f32,
     /// Homogeneous pixel coordinates (x·w, y·w, w) relative to the patch's rectangle, linear in (b2, b3).
     pub screen: [[f32; 3]; 3],
+    /// How the point at λ moves with the pixel that sees it, a pixel to the right and a pixel down:
+    /// `per_px[0]` + λ `per_px[1]`. The unit is the distance within which every point of the object's surface has a
+    /// surfel; 0 if that is not known, not numbers if the triangle has no area on the screen.
+    pub per_px: [[[f32; 3]; 2]; 2],
     /// How far outside the triangle images are drawn, by weight.
     pub guard: [f32; 3],
     /// Positive where the ray leaves the mirror on its front side, linear in (b2, b3).

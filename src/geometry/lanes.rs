@@ -80,6 +80,8 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// Magnitude.
     fn abs(self) -> Self;
+    /// The largest whole number that is not larger.
+    fn floor(self) -> Self;
 
     /// The smaller one; `other` where one is NaN.
     #[inline(always)]
@@ -126,6 +128,10 @@ macro_rules! scalar_real {
             fn abs(self) -> Self {
                 <$t>::abs(self)
             }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                <$t>::floor(self)
+            }
         }
     };
 }
@@ -151,9 +157,9 @@ pub trait Vector<S: Simd>: Real<Scalar = f32> {
     fn compress(self, mask: Self::Mask, out: &mut [f32]);
     /// [`Vector::compress`] of the numbers `first`, `first` + 1, ...
     fn compress_numbers(simd: S, first: u32, mask: Self::Mask, out: &mut [u32]);
-    /// [`Vector::compress`] of `4 (⌊y⌋ stride + ⌊x⌋) + quarter`: the cell of a grid that holds the point, and which
-    /// quarter of the cell, row by row. Where the mask holds, x and y must be in 0 to 2^30 and the result in u32.
-    fn compress_cells(x: Self, y: Self, stride: u32, mask: Self::Mask, out: &mut [u32]);
+    /// [`Vector::compress`] of `16 (y stride + x) + tag`. Where the mask holds, x, y and tag must be whole, not
+    /// negative and below 2^31, 2^31 and 16, and the result in u32.
+    fn compress_cells(cell: [Self; 2], stride: u32, tag: Self, mask: Self::Mask, out: &mut [u32]);
 }
 
 macro_rules! vector_real {
@@ -189,6 +195,10 @@ macro_rules! vector_real {
             fn abs(self) -> Self {
                 SimdFloat::copysign(self, Real::splat(self, 0.0))
             }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                SimdFloat::floor(self)
+            }
         }
 
         impl<S: Simd> Vector<S> for $t<S> {
@@ -223,10 +233,15 @@ macro_rules! vector_real {
                 SimdBase::compress(numbers, mask).store_slice(&mut out[..$n]);
             }
             #[inline(always)]
-            fn compress_cells(x: Self, y: Self, stride: u32, mask: Self::Mask, out: &mut [u32]) {
-                let (x, y): ($u<S>, $u<S>) = ((x + x).to_int(), (y + y).to_int());
-                let cell = (y >> 1) * stride + (x >> 1);
-                let cells = (cell << 2) | ((y & 1) << 1) | (x & 1);
+            fn compress_cells(
+                [x, y]: [Self; 2],
+                stride: u32,
+                tag: Self,
+                mask: Self::Mask,
+                out: &mut [u32],
+            ) {
+                let (x, y, tag): ($u<S>, $u<S>, $u<S>) = (x.to_int(), y.to_int(), tag.to_int());
+                let cells = ((y * stride + x) << 4) | tag;
                 SimdBase::compress(cells, mask).store_slice(&mut out[..$n]);
             }
         }
@@ -339,6 +354,10 @@ impl<V: Real<Scalar = f32>> Real for Pair<V> {
     fn abs(self) -> Self {
         Self(self.0.abs(), self.1.abs())
     }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        Self(self.0.floor(), self.1.floor())
+    }
 }
 
 impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
@@ -376,10 +395,16 @@ impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
         V::compress_numbers(simd, first.wrapping_add(V::LANES), mask.1, out);
     }
     #[inline(always)]
-    fn compress_cells(x: Self, y: Self, stride: u32, mask: Self::Mask, out: &mut [u32]) {
-        V::compress_cells(x.0, y.0, stride, mask.0, out);
+    fn compress_cells(
+        [x, y]: [Self; 2],
+        stride: u32,
+        tag: Self,
+        mask: Self::Mask,
+        out: &mut [u32],
+    ) {
+        V::compress_cells([x.0, y.0], stride, tag.0, mask.0, out);
         let out = &mut out[V::bits(mask.0).count_ones() as usize..];
-        V::compress_cells(x.1, y.1, stride, mask.1, out);
+        V::compress_cells([x.1, y.1], stride, tag.1, mask.1, out);
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::splat::{EMPTY, GUARD, Projection};
+use super::splat::{EMPTY, FILLS, Projection};
 use crate::camera::three_ray::project;
 use crate::image::{NONE, Planes, Reason};
 use crate::plan::SplatPass;
@@ -85,7 +85,7 @@ fn of_patch(
                 continue;
             }
             let surfel = u32::try_from(key & u64::from(u32::MAX)).unwrap_or(NONE);
-            let depth = u32::try_from((key & !GUARD) >> 32).unwrap_or(NONE);
+            let depth = u32::try_from((key & !FILLS) >> 32).unwrap_or(NONE);
             let object = scene.object_of_surfel(surfel);
             let camera = pass.cameras[cameras.clone()].iter().find(|c| c.object as usize == object);
             let Some(camera) = camera else { continue };
@@ -106,9 +106,9 @@ fn of_patch(
                     continue;
                 }
                 seen.images += u32::from(image.within([super::splat::EDGE_TOLERANCE; 3]));
-                // The key's depth may carry the spread of its splat, and Newton in the batch's narrower λ range
-                // may have ended on a neighbouring float: the nearest in depth is the one.
-                let apart = (work.depth(image) - f32::from_bits(depth)).abs();
+                // Newton in the batch's narrower λ range may have ended on a neighbouring float: the nearest in
+                // depth is the one.
+                let apart = (work.depth(image, work.direction(image)) - f32::from_bits(depth)).abs();
                 if apart < least && image.within(camera.guard) {
                     least = apart;
                     let [x, y, _] = work.place(image, 0.0);

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::pool::Pool;
 use crate::camera::three_ray::{Image, project};
+use crate::camera::three_ray::project::along;
 use crate::geometry::Surfels;
 use crate::geometry::surfel::PADDING;
 use crate::geometry::lanes::{Pair, Real, Vector, dot, simd_level};
@@ -19,13 +20,9 @@ use crate::visibility::{NONE_ID, Patch, Visibility};
 pub(crate) const EMPTY: u64 = u64::MAX;
 /// Not a pixel of the patch: nothing is nearer.
 const FOREIGN: u64 = 0;
-/// Set in the keys of images outside the camera's triangle. They lie where the neighbour's camera might put them
-/// elsewhere (beyond a crease or silhouette it does), so they only fill what no image inside covers. Depths are not
-/// negative: their sign bit is free.
-pub(crate) const GUARD: u64 = 1 << 63;
-/// Added to the keys of the pixels beside the one that an image falls on: a depth of about 1/8 more. There the
-/// splat only closes gaps; what falls on them shows its own place better, if it is as near (tuned on the room).
-const SPREAD: u64 = 1 << (32 + 20);
+/// Set in the keys of images that only fill what no other covers: those too far from the pixel's centre for the ray
+/// through it to see their surfel. Depths are not negative: their sign bit is free.
+pub(crate) const FILLS: u64 = 1 << 63;
 /// The paper counts an image as valid if no weight is below minus this (maths: tolerance over shared edges).
 pub(crate) const EDGE_TOLERANCE: f32 = 1e-3;
 /// Surfels projected at a time before they are splatted.
@@ -78,10 +75,9 @@ pub(crate) struct Scratch {
 /// Drawn images.
 #[derive(Default)]
 struct Hits {
-    /// Tile slot of the splat's first pixel, and which of its 2 × 2 pixels the image falls on (see
-    /// [`Vector::compress_cells`]).
+    /// 16 · the tile slot of the splat's first pixel + for each of its 2 × 2 pixels a bit that says whether it
+    /// only [`FILLS`] that.
     cell: Vec<u32>,
-    /// Of an image outside the triangle: its negative.
     depth: Vec<f32>,
     surfel: Vec<u32>,
     len: usize,
@@ -258,16 +254,15 @@ fn splat_hits(hits: &Hits, shape: SplatShape, stride: usize, tile: &mut [u64]) {
     let n = hits.len;
     let hits = hits.cell[..n].iter().zip(&hits.depth[..n]).zip(&hits.surfel[..n]);
     for ((&cell, &depth), &surfel) in hits {
-        // The sign bit of the depth is GUARD.
         let key = u64::from(depth.to_bits()) << 32 | u64::from(surfel);
-        let slot = (cell >> 2) as usize;
+        let slot = (cell >> 4) as usize;
+        let fills = u64::from(cell) << 60;
         match shape {
-            SplatShape::Square1 => tile[slot] = tile[slot].min(key),
+            SplatShape::Square1 => tile[slot] = tile[slot].min(key | (fills << 3 & FILLS)),
             SplatShape::Square2 => {
                 let block = &mut tile[slot..slot + stride + 2];
                 for (corner, i) in [0, 1, stride, stride + 1].into_iter().enumerate() {
-                    let bias = if (cell & 3) as usize == corner { 0 } else { SPREAD };
-                    block[i] = block[i].min(key + bias);
+                    block[i] = block[i].min(key | (fills << (3 - corner) & FILLS));
                 }
             }
         }
@@ -336,10 +331,11 @@ impl Projection<'_> {
                     let lands =
                         zero.lt(lands) & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
                     let lands = drawn & lands;
-                    let depth = self.depth(image);
-                    V::compress_cells(x, y, self.stride, lands, &mut hits.cell[len..]);
-                    let signed = V::select(inside, depth, -depth);
-                    signed.compress(lands, &mut hits.depth[len..]);
+                    let cell = [x.floor(), y.floor()];
+                    let d = self.direction(image);
+                    let fills = self.fills(image, d, [cell[0] - x, cell[1] - y]);
+                    V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
+                    self.depth(image, d).compress(lands, &mut hits.depth[len..]);
                     V::compress_numbers(simd, at, lands, &mut hits.surfel[len..]);
                     len += V::bits(lands).count_ones() as usize;
                 }
@@ -349,6 +345,41 @@ impl Projection<'_> {
         }
         hits.len = len;
         (projections, valid)
+    }
+
+    /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first pixel
+    /// begins.
+    #[inline(always)]
+    fn fills<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3], from: [R; 2]) -> R {
+        let [base, per_lambda] = self.camera.per_px;
+        let right = along(base[0], per_lambda[0], image.lambda);
+        let down = along(base[1], per_lambda[1], image.lambda);
+        // Squared distance from the surfel of the ray through a point (x, y) pixels away: a x² + 2 b x y + c y².
+        let (one, zero) = (image.lambda.splat(1.0), image.lambda.splat(0.0));
+        let per_length = one / dot(d, d);
+        let (right_d, down_d) = (dot(right, d), dot(down, d));
+        let a = dot(right, right) - right_d * right_d * per_length;
+        let b = dot(right, down) - right_d * down_d * per_length;
+        let c = dot(down, down) - down_d * down_d * per_length;
+        // A disk of that distance holds a surfel. Where it is seen so long that it leaves the splat's reach, it has
+        // to be as much wider to hold one within it.
+        let reach_squared = match self.pass.shape {
+            SplatShape::Square1 => 0.25,
+            SplatShape::Square2 => 1.0,
+        };
+        let least = (a * c - b * b) / (a + c) * reach_squared;
+        let mut fills = zero;
+        let pixels: &[_] = match self.pass.shape {
+            SplatShape::Square1 => &[(0.5, 0.5, 1.0)],
+            SplatShape::Square2 => &[(0.0, 0.0, 1.0), (1.0, 0.0, 2.0), (0.0, 1.0, 4.0), (1.0, 1.0, 8.0)],
+        };
+        for &(i, j, bit) in pixels {
+            let (x, y) = (from[0] + i, from[1] + j);
+            let distance = x * x * a + (x * y * b) * 2.0 + y * y * c;
+            let far = one.lt(distance) & one.lt(distance * least);
+            fills = fills + R::select(far, zero.splat(bit), zero);
+        }
+        fills
     }
 
     /// Position in the tile, in pixels plus `offset`, and the homogeneous w.
@@ -362,15 +393,20 @@ impl Projection<'_> {
         [x, y, w]
     }
 
-    /// The depth key: not negative.
+    /// The direction d(w) of the ray.
     #[inline(always)]
-    pub(crate) fn depth<R: Real<Scalar = f32>>(&self, image: &Image<R>) -> R {
+    pub(crate) fn direction<R: Real<Scalar = f32>>(&self, image: &Image<R>) -> [R; 3] {
         let camera = &self.camera.camera;
-        let d = [
+        [
             image.linear([camera.d1[0], camera.f1[0], camera.f2[0]]),
             image.linear([camera.d1[1], camera.f1[1], camera.f2[1]]),
             image.linear([camera.d1[2], camera.f1[2], camera.f2[2]]),
-        ];
+        ]
+    }
+
+    /// The depth key: not negative. `d`: the ray's direction.
+    #[inline(always)]
+    pub(crate) fn depth<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3]) -> R {
         let mut depth = image.lambda * dot(d, d).sqrt();
         if self.pass.depth == DepthKey::PushBack {
             let [x, y, z] = self.camera.from_eye;

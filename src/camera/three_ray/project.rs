@@ -95,7 +95,7 @@ impl<T: Scalar> ThreeRay<T> {
 
 /// a + λ b.
 #[inline(always)]
-fn along<R: Real>(a: [R::Scalar; 3], b: [R::Scalar; 3], lambda: R) -> [R; 3] {
+pub fn along<R: Real>(a: [R::Scalar; 3], b: [R::Scalar; 3], lambda: R) -> [R; 3] {
     [lambda * b[0] + a[0], lambda * b[1] + a[1], lambda * b[2] + a[2]]
 }
 

@@ -1,10 +1,11 @@
 //! From visible patches to cameras: construction rays, guard band, whole-object rejection, object space.
 
 use fearless_simd::{Level, dispatch};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::super::FrameInput;
+use super::footprint::Footprint;
 use super::guard::Guard;
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
@@ -23,6 +24,9 @@ const CONTACT: f64 = 1e-5;
 /// λ ends at this many times the farthest object's distance over the shortest ray: rays interpolated much
 /// shorter than the three given ones are not followed further.
 const SHORTENING: f64 = 1e3;
+/// Surfels are so evenly spread that a disk of this many of their radii about any point of a surface holds one.
+const EVENNESS: f64 = 2.0;
+
 /// What the cameras depend on besides the scene.
 #[derive(Clone, Copy)]
 pub(super) struct CameraSettings {
@@ -113,6 +117,8 @@ fn of_patch(
     let front = linear_form(patch.corners.map(|w| w.dot(facing)));
     let screen = screen_forms(eye, patch, rays.origins);
     let corners_px = rays.origins.map(|v| homogeneous(eye, v));
+    let before = corners_px.iter().all(|c| c.z > 0.0);
+    let seen_px = corners_px.map(|c| if before { c.truncate() / c.z } else { DVec2::NAN });
     let guard = Guard::new(&corners_px, visibility, patch, settings.shape);
     let grown = rays.grown(guard.most());
     let volume = ViewVolume::<f32>::new(&grown);
@@ -134,8 +140,9 @@ fn of_patch(
             let to_scene = &scene.objects[object].to_scene;
             let own = rays_in(to_scene, &rays);
             let range = [tested.lo[slot], tested.hi[slot]];
-            let extent = f64::from(scene.objects[object].extent);
-            let guard = guard.holding(extent, &own, range.map(f64::from));
+            let radius = EVENNESS * f64::from(scene.objects[object].extent);
+            let footprint = Footprint::new(&seen_px, &own);
+            let guard = guard.holding(radius, &footprint, range.map(f64::from));
             let own_grown = own.grown(guard);
             let several = mixed_sign_range(&own_grown, range[0].into(), range[1].into());
             let from_eye =
@@ -150,6 +157,8 @@ fn of_patch(
                 several: several.map_or([1.0, 0.0], |(a, b)| [a as f32, b as f32]),
                 scale: to_scene.scale as f32,
                 screen,
+                per_px: [footprint.base, footprint.per_lambda]
+                    .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / radius))),
                 guard: array(guard),
                 front,
                 from_eye: [0, 1, 2].map(|k| linear_form(from_eye.map(|v| v[k]))),

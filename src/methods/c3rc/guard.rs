@@ -1,9 +1,9 @@
 //! The guard band: how far beyond its triangle a camera must look, so that every splat that covers one of its
 //! pixels is projected (a surfel just across an edge is the neighbour's, but its splat covers this pixel too).
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::DVec3;
 
-use crate::camera::three_ray::Rays;
+use super::footprint::Footprint;
 use crate::plan::SplatShape;
 use crate::visibility::{Patch, Visibility};
 
@@ -13,12 +13,8 @@ const MAX_GUARD: f64 = 0.5;
 /// Added for the rounding of weights to f32.
 const SLACK: f64 = 1e-3;
 
-/// Surfels are so evenly spread that a disk of this many of their radii about any point of a surface holds one.
-const EVENNESS: f64 = 2.0;
-
 /// The margins of one patch, by how far surfels lie apart on the screen.
 pub(super) struct Guard {
-    corners_px: [DVec2; 3],
     none: DVec3,
     most: DVec3,
     most_px: f64,
@@ -36,9 +32,7 @@ impl Guard {
             SplatShape::Square1 => 0.5,
             SplatShape::Square2 => 1.0,
         };
-        let before = corners.iter().all(|c| c.z > 0.0);
         Self {
-            corners_px: corners.map(|c| if before { c.truncate() / c.z } else { DVec2::NAN }),
             none: margins(corners, visibility, patch, 0.0),
             most: margins(corners, visibility, patch, most_px),
             most_px,
@@ -50,13 +44,13 @@ impl Guard {
         self.most
     }
 
-    /// The margins for surfels that stand for disks of this radius, seen by `rays` at λ within `range`: nothing is
-    /// needed from farther outside than one of them must lie from a pixel's centre.
-    pub(super) fn holding(&self, extent: f64, rays: &Rays, range: [f64; 2]) -> DVec3 {
+    /// The margins for surfels of which a disk of this radius about any point of a surface holds one, seen at λ
+    /// within `range`: nothing is needed from farther outside than one of them must lie from a pixel's centre.
+    pub(super) fn holding(&self, radius: f64, footprint: &Footprint, range: [f64; 2]) -> DVec3 {
         let [lo, hi] = range;
         let reach_px = [lo, 0.5 * (lo + hi), hi]
             .into_iter()
-            .map(|lambda| EVENNESS * extent * self.px_per_unit(rays, lambda))
+            .map(|lambda| radius * footprint.px_per_unit(lambda))
             .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
         if reach_px < self.most_px {
             // The least weight over points that move apart is a concave function of how far they do: the chord
@@ -65,21 +59,6 @@ impl Guard {
         } else {
             self.most
         }
-    }
-
-    /// How long a unit across the rays gets at most on the screen, at T(λ). Not a number where T(λ) has no area.
-    fn px_per_unit(&self, rays: &Rays, lambda: f64) -> f64 {
-        let p = |i: usize| rays.origins[i] + rays.directions[i] * lambda;
-        let along = rays.directions.iter().sum::<DVec3>().normalize_or(DVec3::Z);
-        let (u, v) = along.any_orthonormal_pair();
-        let across = |e: DVec3| DVec2::new(e.dot(u), e.dot(v));
-        let world = DMat2::from_cols(across(p(1) - p(0)), across(p(2) - p(0)));
-        let [a, b, c] = self.corners_px;
-        let map = DMat2::from_cols(b - a, c - a) * world.inverse();
-        // The larger singular value.
-        let (x, y) = (map.x_axis, map.y_axis);
-        let (mean, det) = (0.5 * (x.length_squared() + y.length_squared()), map.determinant());
-        (mean + (mean * mean - det * det).max(0.0).sqrt()).sqrt()
     }
 }
 

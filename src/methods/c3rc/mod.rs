@@ -2,6 +2,7 @@
 //! culled against the surfels' trees (backward), which then projects and splats what is left (forward).
 
 mod cameras;
+mod footprint;
 mod guard;
 
 use std::time::Instant;
