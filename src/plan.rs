@@ -63,6 +63,16 @@ pub enum SplatShape {
     Square2,
 }
 
+impl SplatShape {
+    /// How far, along x and y, an image may lie from the centre of a pixel that it covers.
+    pub fn reach_px(self) -> f32 {
+        match self {
+            Self::Square1 => 0.5,
+            Self::Square2 => 1.0,
+        }
+    }
+}
+
 /// What decides which surfel is nearest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthKey {

@@ -19,7 +19,7 @@ use crate::error::Result;
 use crate::image::Planes;
 use crate::plan::{Pass, Plan, Reflection};
 use crate::scene::prepared::{PreparedScene, milliseconds};
-use crate::visibility::Visibility;
+use crate::visibility::{NONE_ID, Visibility};
 
 /// Executes plans; keeps its memory between frames.
 #[derive(Default)]
@@ -73,7 +73,7 @@ impl Backend for Cpu {
                     }
                 }
                 Pass::Resolve => {
-                    resolve(&self.keys, &scene.surfels.radiance, out);
+                    resolve(visibility, &self.keys, &scene.surfels.radiance, out);
                     add(&mut report.passes_ms, milliseconds(start));
                 }
                 Pass::Gather(pass) => {
@@ -92,8 +92,8 @@ impl Cpu {
     }
 }
 
-/// The nearest surfel's radiance at every pixel where one landed.
-fn resolve(keys: &[AtomicU64], radiance: &[Vec3], out: &mut Reflection) {
+/// The nearest surfel's radiance at every pixel where one landed. Pixels that are no mirror's are left alone.
+fn resolve(visibility: &Visibility, keys: &[AtomicU64], radiance: &[Vec3], out: &mut Reflection) {
     out.radiance.resize(keys.len(), Vec3::ZERO);
     out.coverage.resize(keys.len(), 0.0);
     let chunk = 1 << 14;
@@ -101,8 +101,10 @@ fn resolve(keys: &[AtomicU64], radiance: &[Vec3], out: &mut Reflection) {
         .par_chunks_mut(chunk)
         .zip(out.coverage.par_chunks_mut(chunk))
         .zip(keys.par_chunks(chunk))
-        .for_each(|((colors, coverage), keys)| {
-            for ((color, covered), key) in colors.iter_mut().zip(coverage).zip(keys) {
+        .zip(visibility.mirror_ids.par_chunks(chunk))
+        .for_each(|(((colors, coverage), keys), ids)| {
+            let pixels = colors.iter_mut().zip(coverage).zip(keys).zip(ids);
+            for (((color, covered), key), _) in pixels.filter(|(_, id)| **id != NONE_ID) {
                 let key = key.load(Ordering::Relaxed);
                 // The low half of a key is its surfel.
                 #[expect(clippy::cast_possible_truncation, reason = "takes the low half")]

@@ -95,7 +95,8 @@ impl Hits {
     }
 }
 
-/// Runs the pass: the nearest key of every pixel of `visibility` that is a mirror's goes into `keys`.
+/// Runs the pass: the nearest key of every pixel of `visibility` on which something lands goes into `keys`, which are
+/// [`EMPTY`] before.
 pub(crate) fn splat(
     pass: &SplatPass<'_>,
     surfels: &Surfels,
@@ -130,8 +131,11 @@ fn splat_patch(
     let patch = &pass.patches[index];
     let stride = patch.rect.width() + 2 * BORDER;
     let Scratch { batches, hits, tile } = scratch;
-    fill_tile(tile, patch, visibility);
     let cameras = pass.patch_cameras[index] as usize..pass.patch_cameras[index + 1] as usize;
+    if cameras.is_empty() {
+        return counters;
+    }
+    fill_tile(tile, patch, visibility);
     for camera in &pass.cameras[cameras] {
         let start = Instant::now();
         batches.clear();
@@ -363,11 +367,8 @@ impl Projection<'_> {
         let c = dot(down, down) - down_d * down_d * per_length;
         // A disk of that distance holds a surfel. Where it is seen so long that it leaves the splat's reach, it has
         // to be as much wider to hold one within it.
-        let reach_squared = match self.pass.shape {
-            SplatShape::Square1 => 0.25,
-            SplatShape::Square2 => 1.0,
-        };
-        let least = (a * c - b * b) / (a + c) * reach_squared;
+        let reach = self.pass.shape.reach_px();
+        let least = (a * c - b * b) / (a + c) * (reach * reach);
         let mut fills = zero;
         let pixels: &[_] = match self.pass.shape {
             SplatShape::Square1 => &[(0.5, 0.5, 1.0)],

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::super::FrameInput;
 use super::footprint::Footprint;
-use super::guard::Guard;
+use super::guard::{self, Guard};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
 use crate::camera::RayScale;
@@ -25,7 +25,7 @@ const CONTACT: f64 = 1e-5;
 /// shorter than the three given ones are not followed further.
 const SHORTENING: f64 = 1e3;
 /// Surfels are so evenly spread that a disk of this many of their radii about any point of a surface holds one.
-const EVENNESS: f64 = 2.0;
+const EVENNESS: f64 = 1.5;
 
 /// What the cameras depend on besides the scene.
 #[derive(Clone, Copy)]
@@ -114,14 +114,9 @@ fn of_patch(
     }
     let position = eye.position.as_dvec3();
     let facing = DVec3::from_array(mirror.facing(eye.position));
-    let front = linear_form(patch.corners.map(|w| w.dot(facing)));
-    let screen = screen_forms(eye, patch, rays.origins);
     let corners_px = rays.origins.map(|v| homogeneous(eye, v));
-    let before = corners_px.iter().all(|c| c.z > 0.0);
-    let seen_px = corners_px.map(|c| if before { c.truncate() / c.z } else { DVec2::NAN });
-    let guard = Guard::new(&corners_px, visibility, patch, settings.shape);
-    let grown = rays.grown(guard.most());
-    let volume = ViewVolume::<f32>::new(&grown);
+    let around = rays.grown(guard::around(&corners_px, patch, settings.shape));
+    let volume = ViewVolume::<f32>::new(&around);
     let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
     let size = rays.origins.map(|v| (v - position).length());
     let farthest = size.iter().fold(0.0, |m: f64, &s| m.max(s));
@@ -130,6 +125,8 @@ fn of_patch(
         (-CONTACT * farthest / shortest) as f32,
         (SHORTENING * (top.reach + farthest) / shortest) as f32,
     ];
+    // Most patches see no object.
+    let mut exact = None;
     for (g, group) in top.groups.iter().enumerate() {
         let tested = dispatch!(top.level, simd => test_children(simd, group, &volume, BoxTest::Slab, lambda));
         let mut bits = tested.meets & group.used;
@@ -141,6 +138,13 @@ fn of_patch(
             let own = rays_in(to_scene, &rays);
             let range = [tested.lo[slot], tested.hi[slot]];
             let radius = EVENNESS * f64::from(scene.objects[object].extent);
+            let (front, screen, guard) = exact.get_or_insert_with(|| {
+                let front = linear_form(patch.corners.map(|w| w.dot(facing)));
+                let screen = screen_forms(eye, patch, rays.origins);
+                (front, screen, Guard::new(&corners_px, visibility, patch, settings.shape))
+            });
+            let before = corners_px.iter().all(|c| c.z > 0.0);
+            let seen_px = corners_px.map(|c| if before { c.truncate() / c.z } else { DVec2::NAN });
             let footprint = Footprint::new(&seen_px, &own);
             let guard = guard.holding(radius, &footprint, range.map(f64::from));
             let own_grown = own.grown(guard);
@@ -156,11 +160,11 @@ fn of_patch(
                 lambda: range,
                 several: several.map_or([1.0, 0.0], |(a, b)| [a as f32, b as f32]),
                 scale: to_scene.scale as f32,
-                screen,
+                screen: *screen,
                 per_px: [footprint.base, footprint.per_lambda]
                     .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / radius))),
                 guard: array(guard),
-                front,
+                front: *front,
                 from_eye: [0, 1, 2].map(|k| linear_form(from_eye.map(|v| v[k]))),
             });
         }

@@ -13,11 +13,14 @@ const MAX_GUARD: f64 = 0.5;
 /// Added for the rounding of weights to f32.
 const SLACK: f64 = 1e-3;
 
+/// Shares of the splat's reach at which margins are computed; between them a chord is taken.
+const STEPS: [f64; 5] = [0.0, 0.125, 0.25, 0.5, 1.0];
+
 /// The margins of one patch, by how far surfels lie apart on the screen.
 pub(super) struct Guard {
-    none: DVec3,
-    most: DVec3,
-    most_px: f64,
+    /// By [`STEPS`].
+    margins: [DVec3; STEPS.len()],
+    reach_px: f64,
 }
 
 impl Guard {
@@ -28,71 +31,95 @@ impl Guard {
         patch: &Patch,
         shape: SplatShape,
     ) -> Self {
-        let most_px = match shape {
-            SplatShape::Square1 => 0.5,
-            SplatShape::Square2 => 1.0,
-        };
-        Self {
-            none: margins(corners, visibility, patch, 0.0),
-            most: margins(corners, visibility, patch, most_px),
-            most_px,
-        }
-    }
-
-    /// The margins for any surfels.
-    pub(super) fn most(&self) -> DVec3 {
-        self.most
+        let reach_px = shape.reach_px().into();
+        Self { margins: margins(corners, visibility, patch, reach_px), reach_px }
     }
 
     /// The margins for surfels of which a disk of this radius about any point of a surface holds one, seen at λ
     /// within `range`: nothing is needed from farther outside than one of them must lie from a pixel's centre.
     pub(super) fn holding(&self, radius: f64, footprint: &Footprint, range: [f64; 2]) -> DVec3 {
         let [lo, hi] = range;
-        let reach_px = [lo, 0.5 * (lo + hi), hi]
+        let share = [lo, 0.5 * (lo + hi), hi]
             .into_iter()
-            .map(|lambda| radius * footprint.px_per_unit(lambda))
+            .map(|lambda| radius * footprint.px_per_unit(lambda) / self.reach_px)
             .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
-        if reach_px < self.most_px {
-            // The least weight over points that move apart is a concave function of how far they do: the chord
-            // is on the safe side.
-            self.none.lerp(self.most, reach_px / self.most_px)
-        } else {
-            self.most
+        // The least weight over points that move apart is a concave function of how far they do: the chord is on
+        // the safe side. Nothing is found for what is not a number.
+        match STEPS.iter().position(|step| share <= *step) {
+            Some(0) => self.margins[0],
+            Some(i) => {
+                let t = (share - STEPS[i - 1]) / (STEPS[i] - STEPS[i - 1]);
+                self.margins[i - 1].lerp(self.margins[i], t)
+            }
+            None => self.margins[STEPS.len() - 1],
         }
     }
 }
 
-/// The margins m such that what lies at most `reach_px` (along x and y) from the centre of a pixel of the patch has
-/// weights of at least -m_i. Negative where the patch's pixels stay away from an edge (what lies there may be
-/// hidden).
+/// tan 22.5°.
+const OCTAGON: f64 = std::f64::consts::SQRT_2 - 1.0;
+
+/// The margins m such that what lies at most a share of `reach_px` from the centre of a pixel of the
+/// patch has weights of at least -m_i. Negative where the patch's pixels stay away from an edge (what lies there may
+/// be hidden).
 fn margins(
     corners: &[DVec3; 3],
     visibility: &Visibility,
     patch: &Patch,
     reach_px: f64,
-) -> DVec3 {
-    // The weights at picture position p = (x, y, 1) are proportional to rows·p.
-    let [a, b, c] = *corners;
-    let rows = [b.cross(c), c.cross(a), a.cross(b)];
-    let volume = rows[0].dot(a);
-    let mut least = DVec3::INFINITY;
+) -> [DVec3; STEPS.len()] {
+    let weights = Weights::new(corners);
+    let mut least = [DVec3::INFINITY; STEPS.len()];
     for y in patch.rect.min[1]..patch.rect.max[1] {
         let Some((first, last)) = run(visibility, patch, y) else { continue };
-        let middle = f64::from(y) + 0.5;
-        for x in [f64::from(first) + 0.5 - reach_px, f64::from(last) + 0.5 + reach_px] {
-            for y in [middle - reach_px, middle + reach_px] {
-                let p = DVec3::new(x, y, 1.0);
-                let shares = DVec3::new(rows[0].dot(p), rows[1].dot(p), rows[2].dot(p));
-                let sum = shares.x + shares.y + shares.z;
-                if sum * volume <= 0.0 {
-                    // Beyond the triangle's horizon.
-                    return DVec3::splat(MAX_GUARD);
-                }
-                least = least.min(shares / sum);
+        for (least, step) in least.iter_mut().zip(STEPS) {
+            // Half of the octagon about the disk of that radius, about the first pixel and, mirrored, the last.
+            let (r, s) = (step * reach_px, step * reach_px * OCTAGON);
+            for (dx, dy) in [(r, s), (r, -s), (s, r), (s, -r)] {
+                let y = f64::from(y) + 0.5 + dy;
+                *least = least.min(weights.at(f64::from(first) + 0.5 - dx, y));
+                *least = least.min(weights.at(f64::from(last) + 0.5 + dx, y));
             }
         }
     }
+    least.map(margin)
+}
+
+fn margin(least: DVec3) -> DVec3 {
     (DVec3::splat(SLACK) - least).min(DVec3::splat(MAX_GUARD))
+}
+
+/// Margins that are never less than those of any [`Guard`] of the patch, at once: for what need not be exact.
+pub(super) fn around(corners: &[DVec3; 3], patch: &Patch, shape: SplatShape) -> DVec3 {
+    let weights = Weights::new(corners);
+    let reach = f64::from(shape.reach_px()) - 0.5;
+    let [left, top] = patch.rect.min.map(|v| f64::from(v) - reach);
+    let [right, bottom] = patch.rect.max.map(|v| f64::from(v) + reach);
+    let corners = [(left, top), (right, top), (left, bottom), (right, bottom)];
+    margin(corners.into_iter().fold(DVec3::INFINITY, |m, (x, y)| m.min(weights.at(x, y))))
+}
+
+/// Barycentrics of picture positions.
+struct Weights {
+    /// The weights at p = (x, y, 1) are proportional to rows·p.
+    rows: [DVec3; 3],
+    volume: f64,
+}
+
+impl Weights {
+    fn new(corners: &[DVec3; 3]) -> Self {
+        let [a, b, c] = *corners;
+        let rows = [b.cross(c), c.cross(a), a.cross(b)];
+        Self { rows, volume: rows[0].dot(a) }
+    }
+
+    /// Beyond the triangle's horizon, where everything may be needed, less than any number.
+    fn at(&self, x: f64, y: f64) -> DVec3 {
+        let p = DVec3::new(x, y, 1.0);
+        let shares = DVec3::from_array(self.rows.map(|row| row.dot(p)));
+        let sum = shares.x + shares.y + shares.z;
+        if sum * self.volume > 0.0 { shares / sum } else { DVec3::NEG_INFINITY }
+    }
 }
 
 /// The first and last pixel of the patch in a row: weights are extreme there.
