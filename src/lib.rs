@@ -99,7 +99,10 @@
 //! - The direct view is antialiased over five samples a pixel, the reflection has one value a pixel: the
 //!   composition mixes the two by the samples that show a mirror.
 //! - A camera draws a little outside its triangle (guard band), but only on pixels that are its triangle's:
-//!   otherwise surfels that a neighbour projects would be missing along the edges.
+//!   otherwise surfels that a neighbour projects would be missing along the edges. The band is as wide as the
+//!   object's surfels lie apart on the screen, and no wider than a splat.
+//! - The nearest surfel wins only among those that the ray through the pixel's centre can see; farther ones fill
+//!   what is left. Where a pixel sees a whole room, the nearest of all would be wrong.
 //! - Depth is the distance from the mirror along the ray, behind a pre-pass that says which mirror triangle
 //!   a pixel shows. The paper's distance from the eye can let a hidden mirror's reflection win.
 //! - The numeric kernels are written once, over lanes, without fused or approximate operations.

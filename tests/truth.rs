@@ -123,9 +123,9 @@ struct Bar {
 
 /// What every picture of an object should reach.
 const BAR: Bar = Bar { covered: 0.999, placed: 0.995, extra: 0.001 };
-/// Measured where much falls on a pixel: handle, spout and rims see whole rooms in few pixels, and of all that
-/// falls near a pixel the nearest wins, wherever the nine reference rays pass. Filtering will have to mend that.
-const CROWDED: Bar = Bar { covered: 0.998, placed: 0.975, extra: 0.002 };
+/// The default scene adds what a dense scan does not: a floor seen at its contact with the mirror, where its points lie
+/// farther apart than a splat reaches, and far ground in few pixels.
+const DEFAULT: Bar = Bar { covered: 0.998, placed: 0.995, extra: 0.002 };
 
 fn holds(truth: &Truth, bar: Bar) -> bool {
     truth.covered >= bar.covered && truth.placed >= bar.placed && truth.extra <= bar.extra
@@ -161,13 +161,13 @@ fn knot_is_true() {
 
 #[test]
 fn room_is_true() {
-    assert_true("room", &scene("room"), 3_000_000, Bar { covered: BAR.covered, ..CROWDED });
+    assert_true("room", &scene("room"), 3_000_000, BAR);
 }
 
 #[test]
 fn default_scene_is_true() {
     // An object touches the mirror and another pierces it.
-    assert_true("default", &scene("default"), 3_000_000, CROWDED);
+    assert_true("default", &scene("default"), 3_000_000, DEFAULT);
 }
 
 #[test]
@@ -184,13 +184,13 @@ fn the_picture_without_the_object_fails() {
     let mut without = planes(&with, "c3rc", &[]);
     without.object.fill(NONE);
     let truth = compare(&with, &without, &reference);
-    assert!(!holds(&truth, CROWDED) && truth.covered == 0.0, "{truth:?}");
+    assert!(!holds(&truth, DEFAULT) && truth.covered == 0.0, "{truth:?}");
     // Nor does a shifted one pass.
     let mut shifted = planes(&with, "c3rc", &[]);
     shifted.position.rotate_right(8);
     shifted.object.rotate_right(8);
     let truth = compare(&with, &shifted, &reference);
-    assert!(!holds(&truth, CROWDED), "{truth:?}");
+    assert!(!holds(&truth, DEFAULT), "{truth:?}");
 }
 
 #[test]

@@ -108,7 +108,8 @@ fn of_patch(
                 seen.images += u32::from(image.within([super::splat::EDGE_TOLERANCE; 3]));
                 // Newton in the batch's narrower λ range may have ended on a neighbouring float: the nearest in
                 // depth is the one.
-                let apart = (work.depth(image, work.direction(image)) - f32::from_bits(depth)).abs();
+                let apart =
+                    (work.depth(image, work.direction(image)) - f32::from_bits(depth)).abs();
                 if apart < least && image.within(camera.guard) {
                     least = apart;
                     let [x, y, _] = work.place(image, 0.0);

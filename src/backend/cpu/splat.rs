@@ -8,11 +8,11 @@ use fearless_simd::{Level, Simd, dispatch, f32x16};
 use rayon::prelude::*;
 
 use super::pool::Pool;
-use crate::camera::three_ray::{Image, project};
 use crate::camera::three_ray::project::along;
+use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
-use crate::geometry::surfel::PADDING;
 use crate::geometry::lanes::{Pair, Real, Vector, dot, simd_level};
+use crate::geometry::surfel::PADDING;
 use crate::plan::{Batch, CameraInstance, DepthKey, SplatPass, SplatShape};
 use crate::visibility::{NONE_ID, Patch, Visibility};
 
@@ -175,12 +175,7 @@ struct Shared<'a> {
 impl Shared<'_> {
     /// Projects and splats batches into `tile`. A wide camera sees nearly everything in a few pixels: its work is
     /// halved between threads, each with a tile of its own; the nearest key wins, whoever found it.
-    fn project(
-        &self,
-        batches: &[Batch],
-        hits: &mut Hits,
-        tile: &mut Vec<u64>,
-    ) -> SplatCounters {
+    fn project(&self, batches: &[Batch], hits: &mut Hits, tile: &mut Vec<u64>) -> SplatCounters {
         let surfels: usize = batches.iter().map(|b| b.count as usize).sum();
         if surfels <= SHARE || batches.len() < 2 {
             return self.project_in_turn(batches, hits, tile);
@@ -211,7 +206,9 @@ impl Shared<'_> {
         let mut last = Instant::now();
         while !batches.is_empty() {
             let taken = chunk(batches);
-            hits.clear(MAX_IMAGES * taken.iter().map(|b| b.count as usize).sum::<usize>() + PADDING);
+            hits.clear(
+                MAX_IMAGES * taken.iter().map(|b| b.count as usize).sum::<usize>() + PADDING,
+            );
             let (projections, valid) = dispatch!(self.level, simd => self.work.run::<_, Pair<f32x16<_>>>(simd, taken, hits));
             let projected = Instant::now();
             splat_hits(hits, self.work.pass.shape, self.work.stride as usize, tile);
@@ -372,7 +369,9 @@ impl Projection<'_> {
         let mut fills = zero;
         let pixels: &[_] = match self.pass.shape {
             SplatShape::Square1 => &[(0.5, 0.5, 1.0)],
-            SplatShape::Square2 => &[(0.0, 0.0, 1.0), (1.0, 0.0, 2.0), (0.0, 1.0, 4.0), (1.0, 1.0, 8.0)],
+            SplatShape::Square2 => {
+                &[(0.0, 0.0, 1.0), (1.0, 0.0, 2.0), (0.0, 1.0, 4.0), (1.0, 1.0, 8.0)]
+            }
         };
         for &(i, j, bit) in pixels {
             let (x, y) = (from[0] + i, from[1] + j);

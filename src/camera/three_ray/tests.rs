@@ -370,8 +370,38 @@ fn bounds_a_lambda_range() {
             "{test:?} {lo} {hi}"
         );
         let aside = Boxes { center: [0.9, 0.1, 2.5], ..boxes };
-        assert!(!volume.meets::<f64>(test, &aside, 0.0, 100.0).2, "{test:?}");
+        assert!(!volume.meets::<f64>(test, &aside, 0.0, 100.0).meets, "{test:?}");
     }
+}
+
+/// Points of boxes that lie inside, by the slab test, have images in the camera; some boxes do lie inside, none that
+/// straddles a wall does.
+#[test]
+fn boxes_inside_hold_points_with_images() {
+    let mut numbers = Numbers(12);
+    let (mut boxes_inside, mut points, mut seen) = (0, 0, 0);
+    for _ in 0..20_000 {
+        let edge = 10f64.powf(numbers.between(-2.0, -0.3));
+        let rays = numbers.camera(edge, RayScale::EyeDistance);
+        let volume = ViewVolume::<f64>::new(&rays);
+        let camera = ThreeRay::<f64>::new(&rays, &rays);
+        let (v, d) = rays.at(numbers.weights());
+        let center = v + d * numbers.between(0.2, 3.0) - rays.origins[0];
+        let half = DVec3::splat(10f64.powf(numbers.between(-4.0, -1.0)));
+        let boxes = Boxes::<f64> { center: center.to_array(), half: half.to_array() };
+        if !volume.meets(BoxTest::Slab, &boxes, 0.0, 100.0).inside {
+            continue;
+        }
+        boxes_inside += 1;
+        for _ in 0..8 {
+            let q = center + numbers.point() * half;
+            let images = project(&camera, q.to_array(), 0.0, 100.0);
+            points += 1;
+            seen += usize::from(images.as_slice().iter().any(|i| i.within([1e-3; 3])));
+        }
+    }
+    assert!(boxes_inside > 4000, "only {boxes_inside} boxes inside");
+    assert!(seen * 1000 >= points * 995, "{seen} of {points} points have an image");
 }
 
 /// The solver against the bracketed method of Brent in the `roots` crate, on the same monotone pieces, and no root

@@ -133,3 +133,93 @@ fn run(visibility: &Visibility, patch: &Patch, y: u32) -> Option<(u32, u32)> {
     let last = (first..patch.rect.max[0]).rev().find(own)?;
     Some((first, last))
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::camera::eye::ImageSize;
+    use crate::camera::three_ray::Rays;
+    use crate::visibility::{MirrorTriangleIndex, NONE_ID, PixelRect};
+
+    /// A patch of all pixels of a 40 × 30 picture whose centres lie in a triangle of the screen.
+    fn setting(px: [DVec2; 3]) -> ([DVec3; 3], Visibility, Patch) {
+        let mut visibility = Visibility::default();
+        visibility.size = ImageSize { width: 40, height: 30 };
+        // Perspective: the corners have different distances.
+        let corners = [0, 1, 2].map(|i| px[i].extend(1.0) * [1.0, 1.2, 0.9][i]);
+        let weights = Weights::new(&corners);
+        let mut rect = PixelRect { min: [u32::MAX; 2], max: [0; 2] };
+        let mut pixels = 0;
+        for y in 0..30 {
+            for x in 0..40 {
+                let own = weights.at(f64::from(x) + 0.5, f64::from(y) + 0.5).min_element() >= 0.0;
+                visibility.mirror_ids.push(if own { 3 } else { NONE_ID });
+                if own {
+                    pixels += 1;
+                    rect = PixelRect {
+                        min: [rect.min[0].min(x), rect.min[1].min(y)],
+                        max: [rect.max[0].max(x + 1), rect.max[1].max(y + 1)],
+                    };
+                }
+            }
+        }
+        let corners_of = [DVec3::X, DVec3::Y, DVec3::Z];
+        let patch = Patch {
+            triangle: MirrorTriangleIndex(3),
+            corners: corners_of,
+            rect,
+            pixels,
+            cell: None,
+        };
+        (corners, visibility, patch)
+    }
+
+    #[test]
+    fn what_lies_within_reach_of_a_pixel_lies_within_the_margins() {
+        let px = [DVec2::new(5.3, 4.1), DVec2::new(33.0, 9.7), DVec2::new(14.2, 24.6)];
+        let (corners, visibility, patch) = setting(px);
+        let weights = Weights::new(&corners);
+        for shape in [SplatShape::Square1, SplatShape::Square2] {
+            let guard = Guard::new(&corners, &visibility, &patch, shape);
+            let around = around(&corners, &patch, shape);
+            for (step, margins) in STEPS.into_iter().zip(guard.margins) {
+                assert!(margins.cmple(around).all(), "{margins} is more than {around}");
+                let reach = step * f64::from(shape.reach_px());
+                let mut tight = DVec3::NEG_INFINITY;
+                for (i, _) in visibility.mirror_ids.iter().enumerate().filter(|(_, id)| **id == 3) {
+                    for turn in 0..16 {
+                        let at = DVec2::new((i % 40) as f64 + 0.5, (i / 40) as f64 + 0.5)
+                            + DVec2::from_angle(f64::from(turn) * 0.4) * reach;
+                        let outside = -weights.at(at.x, at.y);
+                        assert!(outside.cmple(margins).all(), "{outside} is beyond {margins}");
+                        tight = tight.max(outside);
+                    }
+                }
+                // Not much more than what is needed.
+                assert!((margins - tight).max_element() < 0.02, "{margins} for {tight}");
+            }
+        }
+    }
+
+    #[test]
+    fn margins_grow_with_the_distance_of_surfels_and_end_at_the_splat() {
+        let px = [DVec2::new(5.3, 4.1), DVec2::new(33.0, 9.7), DVec2::new(14.2, 24.6)];
+        let (corners, visibility, patch) = setting(px);
+        let guard = Guard::new(&corners, &visibility, &patch, SplatShape::Square2);
+        let origins = px.map(|p| (p * 0.01).extend(0.0));
+        let rays = Rays { origins, directions: origins.map(|v| v + DVec3::Z) };
+        let footprint = Footprint::new(&px, &rays);
+        let at = |radius: f64| guard.holding(radius, &footprint, [0.5, 1.0]);
+        assert_eq!(at(0.0), guard.margins[0]);
+        let radii = [0.001, 0.003, 0.007, 0.012];
+        for pair in radii.windows(2) {
+            assert!(at(pair[0]).cmplt(at(pair[1])).all(), "{} {}", at(pair[0]), at(pair[1]));
+        }
+        assert_eq!(at(1.0), guard.margins[STEPS.len() - 1]);
+        assert_eq!(at(f64::INFINITY), guard.margins[STEPS.len() - 1]);
+        let flat = Footprint::new(&[DVec2::ZERO; 3], &rays);
+        assert_eq!(guard.holding(0.001, &flat, [0.5, 1.0]), guard.margins[STEPS.len() - 1]);
+    }
+}
