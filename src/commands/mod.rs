@@ -13,6 +13,7 @@ use anyhow::Context as _;
 use catoptric::accel::KdTreeLimits;
 use catoptric::camera::Eye;
 use catoptric::camera::eye::ImageSize;
+use catoptric::geometry::lanes::{SIMD_VARIABLE, requested_level};
 use catoptric::image::io::write_bytes;
 use catoptric::methods::{METHODS, Method, MethodInfo, Params, method};
 use catoptric::scene::arrange::{self, Request};
@@ -143,6 +144,11 @@ impl SceneArgs {
     /// Loads and prepares. `leaf` is a preset's leaf size.
     pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
         memory::check(self.surfels, self.size)?;
+        if let Err(name) = requested_level() {
+            let problem = format!("{name:?} is not an instruction set");
+            let remedy = "unset it, or choose sse2, sse4.2 or avx2";
+            return Err(Error::input(SIMD_VARIABLE, "", problem, remedy).into());
+        }
         self.start_threads()?;
         let start = Instant::now();
         let request = Request {

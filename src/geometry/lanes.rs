@@ -413,20 +413,30 @@ impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
 /// Environment variable that lowers the instruction set: `sse2`, `sse4.2` or `avx2`.
 pub const SIMD_VARIABLE: &str = "CATOPTRIC_SIMD";
 
-/// The best instruction set of this machine, or the lower one that [`SIMD_VARIABLE`] names.
-pub fn simd_level() -> Level {
+/// The best instruction set of this machine, or the lower one that [`SIMD_VARIABLE`] names, if there is that.
+///
+/// # Errors
+/// What the variable says, if that is no name.
+pub fn requested_level() -> Result<Level, String> {
     let best = Level::new();
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    if let Ok(name) = std::env::var(SIMD_VARIABLE) {
-        let lower = match name.as_str() {
-            "sse2" => best.as_sse2().map(Level::Sse2),
-            "sse4.2" => best.as_sse4_2().map(Level::Sse4_2),
-            "avx2" => best.as_avx2().map(Level::Avx2),
-            _ => None,
-        };
-        return lower.unwrap_or(best);
+    let Ok(name) = std::env::var(SIMD_VARIABLE) else { return Ok(best) };
+    if !["sse2", "sse4.2", "avx2"].contains(&name.as_str()) {
+        return Err(name);
     }
-    best
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    let lower = match name.as_str() {
+        "sse2" => best.as_sse2().map(Level::Sse2),
+        "sse4.2" => best.as_sse4_2().map(Level::Sse4_2),
+        _ => best.as_avx2().map(Level::Avx2),
+    };
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    let lower = None;
+    Ok(lower.unwrap_or(best))
+}
+
+/// [`requested_level`], or the best where that is an error.
+pub fn simd_level() -> Level {
+    requested_level().unwrap_or_else(|_| Level::new())
 }
 
 /// Dot product.

@@ -158,3 +158,13 @@ fn comparisons_that_make_no_sense() {
         folder.refused(&format!("compare {options}"), &expected);
     }
 }
+
+#[test]
+fn an_unknown_instruction_set() {
+    let folder = Folder::new();
+    let mut command = folder.command(["info", "knot"]);
+    command.env("CATOPTRIC_SIMD", "avx3");
+    let run = folder.finish(command);
+    let expected = "error: CATOPTRIC_SIMD: \"avx3\" is not an instruction set; unset it, or choose sse2, sse4.2 or avx2\n";
+    assert_eq!((run.code, run.err.as_str()), (Some(2), expected));
+}
