@@ -2,23 +2,26 @@
 
 use fearless_simd::{Level, Simd, dispatch, f32x8};
 
+use crate::accel::kd_tree::representatives::{PAIRS, QUADS, REPRESENTATIVES};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::three_ray::{BoxTest, Boxes, ViewVolume};
-use crate::geometry::lanes::{Vector, simd_level};
-use crate::plan::{Batch, BatchSource, CameraInstance};
+use crate::geometry::lanes::{Real, Vector, dot_const, simd_level};
+use crate::plan::{Batch, BatchSource, CameraInstance, Gaze};
 use crate::scene::prepared::PreparedScene;
 
 /// Walks the objects' trees with one box test.
 pub struct Culler<'a> {
     scene: &'a PreparedScene,
     test: BoxTest,
+    detail: f32,
     level: Level,
 }
 
 impl<'a> Culler<'a> {
-    /// Culls against `scene` with `test`.
-    pub fn new(scene: &'a PreparedScene, test: BoxTest) -> Self {
-        Self { scene, test, level: simd_level() }
+    /// Culls against `scene` with `test`. A node that would be seen as less than 1/`detail` of a pixel is taken as
+    /// one representative; 0: no node is.
+    pub fn new(scene: &'a PreparedScene, test: BoxTest, detail: f32) -> Self {
+        Self { scene, test, detail, level: simd_level() }
     }
 }
 
@@ -31,12 +34,16 @@ impl BatchSource for Culler<'_> {
             test: self.test,
             lambda: camera.lambda,
             first: object.surfels.start,
+            representatives: object.representatives.start,
+            footprint: &camera.footprint,
+            gaze: camera.gaze.filter(|_| self.detail > 0.0),
+            per_pixel: self.detail * std::f32::consts::FRAC_PI_2,
         };
         let from = out.len();
         if self.test == BoxTest::None {
             for first in object.surfels.clone().step_by(WHOLE_BATCH as usize) {
                 let count = (object.surfels.end - first).min(WHOLE_BATCH);
-                out.push(Batch { first, count, lambda: camera.lambda, roots: 1 });
+                out.push(Batch { first, count, stride: 1, lambda: camera.lambda, roots: 1 });
             }
         } else {
             dispatch!(self.level, simd => walk.run(simd, out));
@@ -58,6 +65,12 @@ struct Walk<'a> {
     test: BoxTest,
     lambda: [f32; 2],
     first: u32,
+    representatives: u32,
+    footprint: &'a [[f32; 3]; 3],
+    gaze: Option<Gaze>,
+    /// π/2 representatives' radii squared are to be less than this many times the footprint; 0: see
+    /// [`Culler::new`].
+    per_pixel: f32,
 }
 
 /// A subtree that may meet the volume; `child` = 0: to be taken whole.
@@ -66,9 +79,13 @@ struct Open {
     child: u32,
     first: u32,
     count: u32,
+    stride: u32,
     lambda: [f32; 2],
 }
 
+/// Splats are not drawn out further than this lets them: half the inverse of the footprint's aspect. Where it is
+/// longer a caustic is near.
+const LEAST_ASPECT: f32 = 1.0 / 32.0;
 /// A wide level at least halves the surfels, and each leaves at most seven siblings open.
 const STACK: usize = 32 * (CHILDREN - 1) + 1;
 
@@ -77,22 +94,44 @@ impl Walk<'_> {
     fn run<S: Simd>(&self, simd: S, out: &mut Vec<Batch>) {
         let mut stack = [Open::default(); STACK];
         let mut top = 0;
+        let mut at = 0;
         let mut node = &self.wide[0];
         let mut lambda = self.lambda;
         let from = out.len();
         loop {
             let tested = test_children(simd, node, self.volume, self.test, lambda);
             let mut bits = tested.meets & node.used;
+            if let Some(gaze) = &self.gaze {
+                bits &= !turned_away(simd, node, gaze);
+            }
+            let small = if self.per_pixel > 0.0 { self.small(simd, node, &tested) } else { [0; 3] };
             // The last child first, so that leaves come out in surfel order.
             while bits != 0 {
                 let slot = 63 - bits.leading_zeros() as usize;
                 bits ^= 1 << slot;
-                let inside = tested.inside >> slot & 1 != 0;
-                stack[top] = Open {
-                    child: if inside { 0 } else { node.child[slot] },
-                    first: self.first + node.first[slot],
-                    count: node.count[slot],
-                    lambda: [tested.lo[slot], tested.hi[slot]],
+                let inside = tested.inside >> slot & 1 != 0 && self.per_pixel == 0.0;
+                let of = |wide: u32, slot: u32| {
+                    self.representatives + wide * REPRESENTATIVES as u32 + slot
+                };
+                let lambda = [tested.lo[slot], tested.hi[slot]];
+                let (first, count) = (self.first + node.first[slot], node.count[slot]);
+                let child = node.child[slot];
+                let size = [0, 1, 2].into_iter().find(|k| small[*k] >> slot & 1 != 0);
+                stack[top] = match (size, child) {
+                    (Some(0), _) => {
+                        Open { child: 0, first: of(at, slot as u32), count: 1, stride: 1, lambda }
+                    }
+                    // Of a leaf every fourth or second surfel stands for its neighbours.
+                    (Some(1), 0) => Open { child: 0, first, count: count.div_ceil(4), stride: 4, lambda },
+                    (Some(2), 0) => Open { child: 0, first, count: count.div_ceil(2), stride: 2, lambda },
+                    (Some(1), _) => {
+                        Open { child: 0, first: of(child, QUADS), count: 2, stride: 1, lambda }
+                    }
+                    (Some(_), _) => {
+                        Open { child: 0, first: of(child, PAIRS), count: 4, stride: 1, lambda }
+                    }
+                    (None, _) if inside => Open { child: 0, first, count, stride: 1, lambda },
+                    (None, _) => Open { child, first, count, stride: 1, lambda },
                 };
                 top += 1;
             }
@@ -103,12 +142,16 @@ impl Walk<'_> {
                 top -= 1;
                 let open = stack[top];
                 if open.child != 0 {
-                    node = &self.wide[open.child as usize];
+                    at = open.child;
+                    node = &self.wide[at as usize];
                     lambda = open.lambda;
                     break;
                 }
                 match out[from..].last_mut() {
-                    Some(last) if last.first + last.count == open.first => {
+                    Some(last)
+                        if last.first + last.count * last.stride == open.first
+                            && last.stride == open.stride =>
+                    {
                         last.count += open.count;
                         last.lambda[0] = last.lambda[0].min(open.lambda[0]);
                         last.lambda[1] = last.lambda[1].max(open.lambda[1]);
@@ -116,6 +159,7 @@ impl Walk<'_> {
                     _ => out.push(Batch {
                         first: open.first,
                         count: open.count,
+                        stride: open.stride,
                         lambda: open.lambda,
                         roots: 3,
                     }),
@@ -123,6 +167,44 @@ impl Walk<'_> {
             }
         }
     }
+}
+
+impl Walk<'_> {
+    /// Bit i: child i is seen as small enough for one, two, four representatives.
+    #[inline(always)]
+    fn small<S: Simd>(&self, simd: S, node: &WideNode, tested: &Tested) -> [u64; 3] {
+        type V<S> = f32x8<S>;
+        let lambda = (V::load(simd, &tested.lo) + V::load(simd, &tested.hi)) * 0.5;
+        let [a, b, c] = self.footprint;
+        let a = lambda * (lambda * a[2] + a[1]) + a[0];
+        let b = lambda * (lambda * b[2] + b[1]) + b[0];
+        let c = lambda * (lambda * c[2] + c[1]) + c[0];
+        let radius = V::load(simd, &node.extent);
+        // The geometric mean of the footprint's two squared widths.
+        let needed = radius * radius * (self.per_pixel * 2.0);
+        let zero = V::broadcast(simd, 0.0);
+        let seen = (a * c - b * b).max(zero).sqrt().max((a + c) * LEAST_ASPECT);
+        let real = zero.lt(radius);
+        [
+            V::<S>::bits(needed.le(seen) & real),
+            V::<S>::bits(needed.le(seen * 2.0) & real),
+            V::<S>::bits(needed.le(seen * 4.0) & real),
+        ]
+    }
+}
+
+/// Bit i: all surfels of child i face away from all rays.
+#[inline(always)]
+fn turned_away<S: Simd>(simd: S, node: &WideNode, gaze: &Gaze) -> u64 {
+    type V<S> = f32x8<S>;
+    let axis = [0, 1, 2].map(|k| V::load(simd, &node.cone_axis[k]));
+    let (cosine, sine) = (V::load(simd, &node.cone_cosine), V::load(simd, &node.cone_sine));
+    let between = dot_const(axis, gaze.axis);
+    // The two cones' half angles together: less than the axes leave to a right angle.
+    let sum_sine = sine * gaze.cosine + cosine * gaze.sine;
+    let sum_cosine = cosine * gaze.cosine - sine * gaze.sine;
+    let zero = V::broadcast(simd, 0.0);
+    V::<S>::bits(zero.lt(cosine) & zero.lt(sum_cosine) & sum_sine.lt(between))
 }
 
 /// What a test says of the eight boxes of a node.

@@ -20,12 +20,19 @@ pub struct CameraInstance {
     pub several: [f32; 2],
     /// Length in the scene of a unit of the object's space.
     pub scale: f32,
-    /// Homogeneous pixel coordinates (x·w, y·w, w) relative to the patch's rectangle, linear in (b2, b3).
+    /// Homogeneous screen coordinates (x·w, y·w, w) relative to the patch's rectangle, in samples, linear in (b2, b3).
     pub screen: [[f32; 3]; 3],
-    /// How the point at λ moves with the pixel that sees it, a pixel to the right and a pixel down:
-    /// `per_px[0]` + λ `per_px[1]`. The unit is the distance within which every point of the object's surface has a
-    /// surfel; 0 if that is not known, not numbers if the triangle has no area on the screen.
-    pub per_px: [[[f32; 3]; 2]; 2],
+    /// How the point at λ moves with the place on the screen that sees it, a sample to the right and a sample down:
+    /// `per_sample[0]` + λ `per_sample[1]`. The unit is the distance within which every point of the object's
+    /// surface has a surfel; 0 if that is not known, not numbers if the triangle has no area on the screen.
+    pub per_sample: [[[f32; 3]; 2]; 2],
+    /// Where the rays go, if what faces away from all of them is hidden.
+    pub gaze: Option<Gaze>,
+    /// Radius of the disk that the object's surfels stand for; infinite if that is not known.
+    pub extent: f32,
+    /// What a pixel sees at λ: the symmetric matrix [a b; b c] that gives the squared distance across the rays of
+    /// two points by their distance in pixels; each a quadratic in λ, by power.
+    pub footprint: [[f32; 3]; 3],
     /// How far outside the triangle images are drawn, by weight.
     pub guard: [f32; 3],
     /// Positive where the ray leaves the mirror on its front side, linear in (b2, b3).
@@ -34,13 +41,26 @@ pub struct CameraInstance {
     pub from_eye: [[f32; 3]; 3],
 }
 
+/// The directions of a camera's rays: a cone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaze {
+    /// Unit, in the object's space.
+    pub axis: [f32; 3],
+    /// Cosine of the half angle.
+    pub cosine: f32,
+    /// Sine of that.
+    pub sine: f32,
+}
+
 /// A range of surfels that a camera is to project.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Batch {
     /// First surfel, over the whole scene.
     pub first: u32,
-    /// Number of surfels.
+    /// Number of surfels to project.
     pub count: u32,
+    /// Each stands for so many consecutive ones, of which it is the first.
+    pub stride: u32,
     /// λ that can meet them.
     pub lambda: [f32; 2],
     /// 1 if the theorem allows one image a point, else 3.
@@ -53,19 +73,19 @@ pub trait BatchSource: Send + Sync {
     fn cull(&self, camera: &CameraInstance, out: &mut Vec<Batch>);
 }
 
-/// Which pixels a projected surfel covers.
+/// Which samples a projected surfel covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplatShape {
-    /// The pixel that it falls on.
+    /// The one that it falls on.
     Square1,
-    /// The 2 × 2 pixels around it.
+    /// The 2 × 2 around it.
     #[default]
     Square2,
 }
 
 impl SplatShape {
-    /// How far, along x and y, an image may lie from the centre of a pixel that it covers.
-    pub fn reach_px(self) -> f32 {
+    /// How far, along x and y, an image may lie from a sample that it covers, in samples.
+    pub fn reach(self) -> f32 {
         match self {
             Self::Square1 => 0.5,
             Self::Square2 => 1.0,
@@ -93,8 +113,10 @@ pub struct SplatPass<'a> {
     pub patch_cameras: Vec<u32>,
     /// The culling.
     pub batches: Box<dyn BatchSource + 'a>,
-    /// Footprint.
+    /// Footprint, in samples.
     pub shape: SplatShape,
+    /// Samples along a pixel's side: each has the nearest surfel of its own, and a pixel shows their mean.
+    pub samples: u32,
     /// Depth.
     pub depth: DepthKey,
     /// Keep only the first root that has an image, as the paper's vertex program.

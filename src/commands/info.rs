@@ -23,7 +23,7 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
     check_json(args.json.as_ref())?;
     let ready = args.scene.ready(None, cx)?;
     let scene = &ready.scene;
-    say!("{}: {} surfels", scene.name, scene.surfels.len());
+    say!("{}: {} surfels", scene.name, scene.surfel_count());
     let mut mirrors = Vec::new();
     for mirror in &scene.mirrors {
         let triangles = mirror.mesh.triangles().len();
@@ -74,7 +74,7 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
     );
     let value = json!({
         "scene": scene.name,
-        "surfels": scene.surfels.len(),
+        "surfels": scene.surfel_count(),
         "mirrors": mirrors,
         "objects": objects,
         "methods": methods,

@@ -97,7 +97,7 @@ pub(crate) fn figures(ready: &Ready, report: &FrameReport) -> Value {
         "method": report.method,
         "backend": report.backend,
         "size": [size.width, size.height],
-        "surfels": scene.surfels.len(),
+        "surfels": scene.surfel_count(),
         "mirror_triangles": scene.mirror_triangle_count(),
         "cameras": report.cameras,
         "batches": report.batches,
@@ -145,7 +145,7 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
     );
     say!(
         "  {} surfels, {} mirror triangles, {} mirror pixels",
-        ready.scene.surfels.len(),
+        ready.scene.surfel_count(),
         ready.scene.mirror_triangle_count(),
         report.mirror_pixels
     );

@@ -157,8 +157,8 @@ pub trait Vector<S: Simd>: Real<Scalar = f32> {
     /// The lanes of `mask`, in order, into the front of `out`, which has room for `LANES`; what lies behind them is
     /// overwritten.
     fn compress(self, mask: Self::Mask, out: &mut [f32]);
-    /// [`Vector::compress`] of the numbers `first`, `first` + 1, ...
-    fn compress_numbers(simd: S, first: u32, mask: Self::Mask, out: &mut [u32]);
+    /// [`Vector::compress`] of the first `LANES` of `numbers`.
+    fn compress_numbers(simd: S, numbers: &[u32], mask: Self::Mask, out: &mut [u32]);
     /// [`Vector::compress`] of `16 (y stride + x) + tag`. Where the mask holds, x, y and tag must be whole, not
     /// negative and below 2^31, 2^31 and 16, and the result in u32.
     fn compress_cells(cell: [Self; 2], stride: u32, tag: Self, mask: Self::Mask, out: &mut [u32]);
@@ -230,8 +230,8 @@ macro_rules! vector_real {
                 SimdBase::compress(self, mask).store_slice(&mut out[..$n]);
             }
             #[inline(always)]
-            fn compress_numbers(simd: S, first: u32, mask: Self::Mask, out: &mut [u32]) {
-                let numbers = $u::from_slice(simd, &COUNTING[..$n]) + first;
+            fn compress_numbers(simd: S, numbers: &[u32], mask: Self::Mask, out: &mut [u32]) {
+                let numbers = $u::from_slice(simd, &numbers[..$n]);
                 SimdBase::compress(numbers, mask).store_slice(&mut out[..$n]);
             }
             #[inline(always)]
@@ -251,8 +251,6 @@ macro_rules! vector_real {
 }
 vector_real!(f32x8, u32x8, 8);
 vector_real!(f32x16, u32x16, 16);
-
-const COUNTING: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Two vectors side by side: a kernel whose operations wait for each other runs two chains at once.
 #[derive(Clone, Copy, Debug)]
@@ -391,10 +389,10 @@ impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
         self.1.compress(mask.1, &mut out[V::bits(mask.0).count_ones() as usize..]);
     }
     #[inline(always)]
-    fn compress_numbers(simd: S, first: u32, mask: Self::Mask, out: &mut [u32]) {
-        V::compress_numbers(simd, first, mask.0, out);
+    fn compress_numbers(simd: S, numbers: &[u32], mask: Self::Mask, out: &mut [u32]) {
+        V::compress_numbers(simd, numbers, mask.0, out);
         let out = &mut out[V::bits(mask.0).count_ones() as usize..];
-        V::compress_numbers(simd, first.wrapping_add(V::LANES), mask.1, out);
+        V::compress_numbers(simd, &numbers[V::LANES as usize..], mask.1, out);
     }
     #[inline(always)]
     fn compress_cells(
@@ -476,7 +474,8 @@ mod tests {
         let n = V::bits(mask).count_ones() as usize;
         let (x, y, tag) = (V::load(simd, x), V::load(simd, y), V::load(simd, tag));
         x.compress(mask, &mut values);
-        V::compress_numbers(simd, 1000, mask, &mut numbers);
+        let counted: Vec<u32> = (1000..1000 + V::LANES).collect();
+        V::compress_numbers(simd, &counted, mask, &mut numbers);
         V::compress_cells([x, y], 77, tag, mask, &mut cells);
         values.truncate(n);
         numbers.truncate(n);

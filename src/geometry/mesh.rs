@@ -1,5 +1,7 @@
 //! Triangle meshes that were checked once and are trusted afterwards.
 
+use std::collections::HashMap;
+
 use glam::Vec3;
 
 use super::Aabb;
@@ -52,6 +54,9 @@ pub enum MeshDefect {
 
 /// Coordinates beyond this cannot be squared and summed safely in f32.
 pub(crate) const MAX_COORDINATE: f32 = 1e15;
+
+/// Share of a closed mesh's area whose normals have to agree with its triangles' sides.
+const MOSTLY: f64 = 0.999;
 
 impl Mesh {
     /// Checks the parts and completes the normals.
@@ -144,6 +149,46 @@ impl Mesh {
     /// Tight box of the vertices that triangles use.
     pub fn bounds(&self) -> Aabb {
         Aabb::of(self.triangles.iter().flatten().map(|&i| self.positions[i as usize]))
+    }
+
+    /// Whether the triangles enclose a volume and the normals point out of it: every edge has one triangle on each
+    /// side. Vertices at one place count as one.
+    pub fn is_closed_outward(&self) -> bool {
+        let mut names = HashMap::with_capacity(self.positions.len());
+        let name: Vec<u32> = self
+            .positions
+            .iter()
+            .map(|p| {
+                // -0 is 0.
+                let key = p.to_array().map(|x| (x + 0.0).to_bits());
+                let next = names.len();
+                *names.entry(key).or_insert_with(|| u32::try_from(next).unwrap_or(u32::MAX))
+            })
+            .collect();
+        let mut edges = Vec::with_capacity(3 * self.triangles.len());
+        let (mut volume, mut outward) = (0.0, 0.0);
+        let middle = self.bounds().center().as_dvec3();
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|i| name[i as usize]);
+            if a == b || b == c || c == a {
+                continue;
+            }
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                edges.push(if from < to { (from, to, 1i8) } else { (to, from, -1) });
+            }
+            let p = triangle.map(|i| self.positions[i as usize].as_dvec3() - middle);
+            let face = (p[1] - p[0]).cross(p[2] - p[0]);
+            volume += p[0].dot(face);
+            let normal: Vec3 = triangle.iter().map(|&i| self.normals[i as usize]).sum();
+            outward += normal.as_dvec3().dot(face).signum() * face.length();
+        }
+        edges.sort_unstable();
+        let pairs = edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
+        let area = 2.0 * self.area();
+        volume > 0.0
+            && outward > MOSTLY * area
+            && edges.len().is_multiple_of(2)
+            && { pairs }.all(|pair| pair.len() == 2 && pair[0].2 + pair[1].2 == 0)
     }
 
     /// Fills in missing normals: the average of the adjacent triangles' normals, weighted by the angle

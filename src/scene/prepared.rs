@@ -84,6 +84,10 @@ pub struct PreparedObject {
     pub tree: KdTree,
     /// Its part of the scene's surfels.
     pub surfels: Range<u32>,
+    /// What stands for the nodes of its tree, behind its surfels.
+    pub representatives: Range<u32>,
+    /// Its surface encloses it with outward normals: from outside, what faces away is hidden.
+    pub closed: bool,
     /// Largest radius that one of its surfels stands for, object space; infinite if that is not known.
     pub extent: f32,
     /// Contains its surfels, scene space.
@@ -121,7 +125,7 @@ pub struct PreparedScene {
     pub mirrors: Vec<PreparedMirror>,
     /// Objects.
     pub objects: Vec<PreparedObject>,
-    /// All surfels, object by object, each in leaf order.
+    /// All surfels, object by object, each in leaf order and followed by its representatives.
     pub surfels: Surfels,
     /// The objects' triangles in scene space, object by object.
     pub triangles: TriangleBvh,
@@ -187,10 +191,12 @@ impl PreparedScene {
         let mut first_triangle = 0;
         for (object, mut own) in scene.objects.iter().zip(sampled) {
             cx.step("building trees", objects.len() as f64 / scene.objects.len() as f64)?;
-            let tree = KdTree::build(&mut own, limits);
+            let mut tree = KdTree::build(&mut own, limits);
             let first = index(surfels.len());
+            let count = index(own.len());
             let known = |e: f32| if e > 0.0 { e } else { f32::INFINITY };
             let extent = own.extent.iter().copied().map(known).fold(0.0, f32::max);
+            tree.append_representatives(&mut own);
             append(&mut surfels, own);
             objects.push(PreparedObject {
                 name: object.name.clone(),
@@ -199,7 +205,9 @@ impl PreparedScene {
                 to_scene: Similarity::IDENTITY,
                 positions: Vec::new(),
                 tree,
-                surfels: first..index(surfels.len()),
+                surfels: first..first + count,
+                representatives: first + count..index(surfels.len()),
+                closed: object.mesh.is_closed_outward(),
                 extent,
                 bounds: Aabb::EMPTY,
                 first_triangle,
@@ -232,6 +240,7 @@ impl PreparedScene {
         for (i, object) in scene.objects.iter().enumerate() {
             prepared.place(i, &object.transform);
         }
+        prepared.average();
         Ok(prepared)
     }
 
@@ -287,7 +296,21 @@ impl PreparedScene {
                 cx,
             )?;
         }
+        self.average();
         Ok(())
+    }
+
+    /// Gives the representatives the colours of what they stand for.
+    fn average(&mut self) {
+        for object in &self.objects {
+            object.tree.average(&mut self.surfels.radiance, object.surfels.start as usize);
+            object.tree.average(&mut self.surfels.albedo, object.surfels.start as usize);
+        }
+    }
+
+    /// Number of surfels over all objects, without representatives.
+    pub fn surfel_count(&self) -> usize {
+        self.objects.iter().map(|o| o.surfels.len()).sum()
     }
 
     /// Number of mirror triangles over all mirrors.
@@ -318,9 +341,9 @@ impl PreparedScene {
         (object, (triangle - self.objects[object].first_triangle) as usize)
     }
 
-    /// The object of a surfel.
+    /// The object of a surfel or representative.
     pub fn object_of_surfel(&self, surfel: u32) -> usize {
-        self.objects.partition_point(|o| o.surfels.end <= surfel)
+        self.objects.partition_point(|o| o.representatives.end <= surfel)
     }
 }
 

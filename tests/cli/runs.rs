@@ -341,3 +341,17 @@ fn nobody_needs_to_listen() {
     }
     assert_eq!(png_size(&folder.read("a.png")), [160, 90]);
 }
+
+#[test]
+fn several_rays_a_pixel_come_nearer_to_many() {
+    let folder = Folder::new();
+    let line = "render default --size 320x180 --surfels 1000 --method raytrace";
+    folder.good(&format!("{line} --spp 64 -o many.exr --aov many.aov.exr"));
+    let error = |spp: u32| {
+        folder.good(&format!("{line} --spp {spp} -o few.exr"));
+        folder.good("compare few.exr many.exr --aov-b many.aov.exr --where object --json e.json");
+        folder.json("e.json")["rmse"].as_f64().unwrap()
+    };
+    let (one, four) = (error(1), error(4));
+    assert!(four < 0.7 * one, "{four} is not much less than {one}");
+}

@@ -41,6 +41,7 @@ fn subtree(items: &mut [Item], first: u32, leaf_points: u32, smallest: f32) -> V
     let cone = NormalCone { axis: Vec3::ZERO, cosine: -1.0 };
     let node = Node { bounds, cone, first, count, right: 0 };
     if count <= leaf_points || bounds.diagonal() <= smallest {
+        spread(items);
         return vec![node];
     }
     // A multiple of the leaf's size goes left, so that all leaves but one are full.
@@ -66,6 +67,22 @@ fn subtree(items: &mut [Item], first: u32, leaf_points: u32, smallest: f32) -> V
     nodes.extend(left);
     nodes.extend(right);
     nodes
+}
+
+/// Orders a leaf's surfels so that neighbours in the list are neighbours in space: every second, or every fourth, one
+/// then stands for all.
+fn spread(items: &mut [Item]) {
+    if items.len() <= 2 {
+        return;
+    }
+    let half = items.len().next_power_of_two() / 2;
+    let axis = bounds(items).extent().max_position();
+    items.sort_unstable_by(|a, b| {
+        a.position[axis].total_cmp(&b.position[axis]).then(a.surfel.cmp(&b.surfel))
+    });
+    let (left, right) = items.split_at_mut(half);
+    spread(left);
+    spread(right);
 }
 
 /// Brings the surfels into leaf order.

@@ -4,6 +4,7 @@
 //! object's space, so a rigid motion or a uniform scale of the object never touches it.
 
 mod build;
+pub mod representatives;
 mod wide;
 
 use glam::Vec3;
@@ -80,6 +81,18 @@ impl KdTree {
         let nodes = build::build(surfels, limits);
         let wide = wide::collapse(&nodes);
         Self { nodes, wide }
+    }
+
+    /// Appends the representatives of all wide nodes to `surfels` (see [`representatives`]): those of wide node w
+    /// begin at `w` · [`REPRESENTATIVES`](representatives::REPRESENTATIVES) behind the surfels. Their colours are left to [`KdTree::average`].
+    pub fn append_representatives(&mut self, surfels: &mut Surfels) {
+        representatives::append(&mut self.wide, surfels);
+    }
+
+    /// Gives every representative the mean of its surfels' values. `first`: the first surfel in `values`; the
+    /// representatives follow the surfels.
+    pub fn average(&self, values: &mut [Vec3], first: usize) {
+        representatives::average(&self.wide, values, first, first + self.nodes[0].count as usize);
     }
 
     /// The binary nodes in preorder; the first is the root.

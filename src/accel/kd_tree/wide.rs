@@ -8,6 +8,8 @@ use crate::geometry::Aabb;
 /// Children of a wide node.
 pub const CHILDREN: usize = 8;
 const WIDTH: u32 = 8;
+/// For the rounding of a cone's cosine.
+const CONE_SLACK: f32 = 1e-5;
 
 /// Eight boxes and what is in them. Unused ones are empty (count 0).
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +24,14 @@ pub struct WideNode {
     pub count: [u32; CHILDREN],
     /// Wide node of each child; 0 for a leaf.
     pub child: [u32; CHILDREN],
+    /// Radius of the disk that stands for each child; 0 before there are representatives.
+    pub extent: [f32; CHILDREN],
+    /// Axis of each child's normal cone, by coordinate.
+    pub cone_axis: [[f32; CHILDREN]; 3],
+    /// Cosine of its half angle.
+    pub cone_cosine: [f32; CHILDREN],
+    /// Sine of that.
+    pub cone_sine: [f32; CHILDREN],
     /// Bit i: child i is used.
     pub used: u64,
 }
@@ -34,6 +44,10 @@ impl WideNode {
         first: [0; CHILDREN],
         count: [0; CHILDREN],
         child: [0; CHILDREN],
+        extent: [0.0; CHILDREN],
+        cone_axis: [[0.0; CHILDREN]; 3],
+        cone_cosine: [-1.0; CHILDREN],
+        cone_sine: [0.0; CHILDREN],
         used: 0,
     };
 
@@ -47,6 +61,16 @@ impl WideNode {
             self.half[axis][slot] = half[axis];
         }
         self.used |= 1 << slot;
+    }
+
+    /// Puts a normal cone into a slot, a little wider than it is.
+    fn set_cone(&mut self, slot: usize, cone: super::NormalCone) {
+        for axis in 0..3 {
+            self.cone_axis[axis][slot] = cone.axis[axis];
+        }
+        let cosine = (cone.cosine - CONE_SLACK).clamp(-1.0, 1.0);
+        self.cone_cosine[slot] = cosine;
+        self.cone_sine[slot] = (1.0 - cosine * cosine).max(0.0).sqrt();
     }
 
     /// The box in a slot, not smaller than what was put there.
@@ -75,6 +99,7 @@ pub(super) fn collapse(nodes: &[Node]) -> Vec<WideNode> {
                 open.push((child, index));
             }
             wide[at].set_box(slot, node.bounds);
+            wide[at].set_cone(slot, node.cone);
             wide[at].first[slot] = node.first;
             wide[at].count[slot] = node.count;
             wide[at].child[slot] = u32::try_from(child).expect("fewer nodes than surfels");

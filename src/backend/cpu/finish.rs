@@ -37,7 +37,9 @@ pub fn finish(
                     if covered < 1.0 && !environment_included {
                         let px = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
                         let sky = reflected_sky(scene, eye, id, px);
-                        *radiance += sky * (1.0 - covered);
+                        // Where nothing landed the radiance is an older picture's.
+                        let behind = sky * (1.0 - covered);
+                        *radiance = if covered > 0.0 { *radiance + behind } else { behind };
                     }
                     *radiance *= scene.mirrors[scene.mirror_of(id).0].tint;
                 }

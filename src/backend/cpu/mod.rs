@@ -6,25 +6,23 @@ mod planes;
 pub mod pool;
 pub mod splat;
 
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use self::pool::Pool;
-use self::splat::EMPTY;
+use self::splat::Landed;
 use super::{Backend, ExecuteReport};
 use crate::error::Result;
 use crate::image::Planes;
 use crate::plan::{Pass, Plan, Reflection};
 use crate::scene::prepared::{PreparedScene, milliseconds};
-use crate::visibility::{NONE_ID, Visibility};
+use crate::visibility::Visibility;
 
 /// Executes plans; keeps its memory between frames.
 #[derive(Default)]
 pub struct Cpu {
-    keys: Vec<AtomicU64>,
+    landed: Vec<Vec<Landed>>,
     scratch: Pool<splat::Scratch>,
 }
 
@@ -55,9 +53,9 @@ impl Backend for Cpu {
             let start = Instant::now();
             match pass {
                 Pass::Splat(pass) => {
-                    self.clear(size.pixels());
-                    let done =
-                        splat::splat(pass, &scene.surfels, visibility, &self.scratch, &self.keys);
+                    let (done, landed) =
+                        splat::splat(pass, &scene.surfels, visibility, &self.scratch);
+                    self.landed = landed;
                     add(&mut report.passes_ms, milliseconds(start));
                     report.cameras += pass.cameras.len();
                     report.patches += pass.patches.len();
@@ -69,11 +67,11 @@ impl Backend for Cpu {
                     add(&mut report.project_ms, done.project_ns as f64 * per_thread);
                     add(&mut report.splat_ms, done.splat_ns as f64 * per_thread);
                     if let Some(planes) = &mut out.planes {
-                        self::planes::splat_planes(pass, scene, visibility, &self.keys, planes);
+                        self::planes::splat_planes(pass, scene, visibility, &self.landed, planes);
                     }
                 }
                 Pass::Resolve => {
-                    resolve(visibility, &self.keys, &scene.surfels.radiance, out);
+                    resolve(size.pixels(), &self.landed, out);
                     add(&mut report.passes_ms, milliseconds(start));
                 }
                 Pass::Gather(pass) => {
@@ -85,33 +83,14 @@ impl Backend for Cpu {
     }
 }
 
-impl Cpu {
-    fn clear(&mut self, pixels: usize) {
-        self.keys.resize_with(pixels, || AtomicU64::new(EMPTY));
-        self.keys.par_iter_mut().with_min_len(1 << 14).for_each(|key| *key.get_mut() = EMPTY);
+/// Puts the pixels that something landed on into the reflection. Where nothing did the coverage is 0, and the
+/// radiance whatever it was.
+fn resolve(pixels: usize, landed: &[Vec<Landed>], out: &mut Reflection) {
+    out.radiance.resize(pixels, Vec3::ZERO);
+    out.coverage.resize(pixels, 0.0);
+    out.coverage.fill(0.0);
+    for pixel in landed.iter().flatten() {
+        out.radiance[pixel.pixel as usize] = pixel.radiance;
+        out.coverage[pixel.pixel as usize] = pixel.coverage;
     }
-}
-
-/// The nearest surfel's radiance at every pixel where one landed. Pixels that are no mirror's are left alone.
-fn resolve(visibility: &Visibility, keys: &[AtomicU64], radiance: &[Vec3], out: &mut Reflection) {
-    out.radiance.resize(keys.len(), Vec3::ZERO);
-    out.coverage.resize(keys.len(), 0.0);
-    let chunk = 1 << 14;
-    out.radiance
-        .par_chunks_mut(chunk)
-        .zip(out.coverage.par_chunks_mut(chunk))
-        .zip(keys.par_chunks(chunk))
-        .zip(visibility.mirror_ids.par_chunks(chunk))
-        .for_each(|(((colors, coverage), keys), ids)| {
-            let pixels = colors.iter_mut().zip(coverage).zip(keys).zip(ids);
-            for (((color, covered), key), _) in pixels.filter(|(_, id)| **id != NONE_ID) {
-                let key = key.load(Ordering::Relaxed);
-                // The low half of a key is its surfel.
-                #[expect(clippy::cast_possible_truncation, reason = "takes the low half")]
-                let surfel = key as u32 as usize;
-                let landed = key != EMPTY;
-                *color = if landed { radiance[surfel] } else { Vec3::ZERO };
-                *covered = f32::from(u8::from(landed));
-            }
-        });
 }

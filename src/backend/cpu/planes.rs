@@ -1,11 +1,9 @@
 //! What was seen at every pixel, re-derived from the winning keys by the same projection.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::splat::{EMPTY, FILLS, Projection};
+use super::splat::{EMPTY, FILLS, Landed, Projection};
 use crate::camera::three_ray::project;
 use crate::image::{NONE, Planes, Reason};
 use crate::plan::SplatPass;
@@ -39,9 +37,15 @@ pub(crate) fn splat_planes(
     pass: &SplatPass<'_>,
     scene: &PreparedScene,
     visibility: &Visibility,
-    keys: &[AtomicU64],
+    landed: &[Vec<Landed>],
     planes: &mut Planes,
 ) {
+    let mut keys = vec![EMPTY; visibility.size.pixels()];
+    for pixel in landed.iter().flatten() {
+        keys[pixel.pixel as usize] = pixel.key;
+        planes.coverage[pixel.pixel as usize] = pixel.coverage;
+    }
+    let keys = &keys;
     let lists: Vec<Vec<Seen>> = (0..pass.patches.len())
         .into_par_iter()
         .map(|index| of_patch(pass, scene, visibility, keys, index))
@@ -56,7 +60,6 @@ pub(crate) fn splat_planes(
         planes.normal[i] = object.to_scene.direction(normal).as_vec3().to_array();
         planes.lambda[i] = seen.lambda;
         planes.splat[i] = seen.splat;
-        planes.coverage[i] = 1.0;
         planes.object[i] = seen.object;
         planes.surfel[i] = seen.surfel;
         planes.images[i] = seen.images;
@@ -68,7 +71,7 @@ fn of_patch(
     pass: &SplatPass<'_>,
     scene: &PreparedScene,
     visibility: &Visibility,
-    keys: &[AtomicU64],
+    keys: &[u64],
     index: usize,
 ) -> Vec<Seen> {
     let patch = &pass.patches[index];
@@ -80,7 +83,7 @@ fn of_patch(
             let pixel = (y * width + x) as usize;
             let own = visibility.mirror_ids[pixel] == patch.triangle.0
                 && patch.cell.is_none_or(|c| c.contains(x, y));
-            let key = keys[pixel].load(Ordering::Relaxed);
+            let key = keys[pixel];
             if !own || key == EMPTY {
                 continue;
             }
@@ -114,7 +117,9 @@ fn of_patch(
                     least = apart;
                     let [x, y, _] = work.place(image, 0.0);
                     seen.lambda = image.lambda;
-                    seen.splat = [x + patch.rect.min[0] as f32, y + patch.rect.min[1] as f32];
+                    let to_px = 1.0 / pass.samples as f32;
+                    let [left, top] = patch.rect.min.map(|v| v as f32);
+                    seen.splat = [x * to_px + left, y * to_px + top];
                 }
             }
             list.push(seen);

@@ -1,8 +1,10 @@
 //! The splat pass on the CPU: a patch is a task. Its tile of depth|surfel keys lies in the innermost cache; a
-//! key of 0 marks pixels of others, so that one comparison decides ownership and depth.
+//! key of 0 marks samples of others, so that one comparison decides ownership and depth. The task ends with its
+//! pixels' colours, so that no picture of keys is ever written.
 
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
+
+use glam::Vec3;
 
 use fearless_simd::{Level, Simd, dispatch, f32x16};
 use rayon::prelude::*;
@@ -26,7 +28,7 @@ pub(crate) const FILLS: u64 = 1 << 63;
 /// The paper counts an image as valid if no weight is below minus this (maths: tolerance over shared edges).
 pub(crate) const EDGE_TOLERANCE: f32 = 1e-3;
 /// Surfels projected at a time before they are splatted.
-const CHUNK: usize = 2048;
+const CHUNK: usize = 1024;
 /// Of a surfel in a camera.
 const MAX_IMAGES: usize = 3;
 /// A camera with more surfels than this shares them with idle threads (untuned).
@@ -64,12 +66,93 @@ impl SplatCounters {
     }
 }
 
+/// A pixel that something landed on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Landed {
+    /// Which, by row.
+    pub(crate) pixel: u32,
+    /// Share of its samples that are covered.
+    pub(crate) coverage: f32,
+    /// Sum over those of the surfels' radiance, over all samples.
+    pub(crate) radiance: Vec3,
+    /// The nearest key of its samples.
+    pub(crate) key: u64,
+}
+
 /// Memory of one task, reused.
 #[derive(Default)]
 pub(crate) struct Scratch {
     batches: Vec<Batch>,
+    packed: Packed,
     hits: Hits,
     tile: Vec<u64>,
+}
+
+/// Surfels to be projected, side by side, whatever batches they come from.
+#[derive(Default)]
+struct Packed {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+    /// Squared share of the surfel's radius in that of the object's surfels, inverse.
+    size: Vec<f32>,
+    lo: Vec<f32>,
+    hi: Vec<f32>,
+    surfel: Vec<u32>,
+}
+
+impl Packed {
+    fn clear(&mut self) {
+        for list in [&mut self.x, &mut self.y, &mut self.z, &mut self.size, &mut self.lo, &mut self.hi] {
+            list.clear();
+        }
+        self.surfel.clear();
+    }
+
+    fn len(&self) -> usize {
+        self.surfel.len()
+    }
+
+    /// Adds as much of `batch` as there is room for, from its surfel `from` on; returns how much.
+    fn add(&mut self, surfels: &Surfels, extent: f32, batch: &Batch, from: u32) -> u32 {
+        let room = u32::try_from(CHUNK - self.len()).unwrap_or(0);
+        let count = (batch.count - from).min(room);
+        let first = batch.first + from * batch.stride;
+        if batch.stride == 1 {
+            let range = first as usize..(first + count) as usize;
+            self.x.extend_from_slice(&surfels.x[range.clone()]);
+            self.y.extend_from_slice(&surfels.y[range.clone()]);
+            self.z.extend_from_slice(&surfels.z[range.clone()]);
+            let sizes = surfels.extent[range].iter().map(|e| (extent / e) * (extent / e));
+            self.size.extend(sizes);
+            self.surfel.extend(first..first + count);
+        } else {
+            let share = 1.0 / batch.stride as f32;
+            for surfel in (first..).step_by(batch.stride as usize).take(count as usize) {
+                let i = surfel as usize;
+                self.x.push(surfels.x[i]);
+                self.y.push(surfels.y[i]);
+                self.z.push(surfels.z[i]);
+                self.size.push(share);
+                self.surfel.push(surfel);
+            }
+        }
+        if !extent.is_finite() {
+            let n = self.size.len();
+            self.size[n - count as usize..].fill(1.0);
+        }
+        self.lo.resize(self.lo.len() + count as usize, batch.lambda[0]);
+        self.hi.resize(self.hi.len() + count as usize, batch.lambda[1]);
+        count
+    }
+
+    /// Makes vector loads beyond the end possible.
+    fn pad(&mut self) {
+        for list in [&mut self.x, &mut self.y, &mut self.z, &mut self.size, &mut self.lo, &mut self.hi] {
+            list.resize(list.len() + PADDING, 0.0);
+        }
+        self.surfel.resize(self.surfel.len() + PADDING, 0);
+    }
 }
 
 /// Drawn images.
@@ -95,68 +178,100 @@ impl Hits {
     }
 }
 
-/// Runs the pass: the nearest key of every pixel of `visibility` on which something lands goes into `keys`, which are
-/// [`EMPTY`] before.
+/// Runs the pass. Every pixel of a mirror belongs to one patch, so no pixel is in the lists twice.
 pub(crate) fn splat(
     pass: &SplatPass<'_>,
     surfels: &Surfels,
     visibility: &Visibility,
     pool: &Pool<Scratch>,
-    keys: &[AtomicU64],
-) -> SplatCounters {
+) -> (SplatCounters, Vec<Vec<Landed>>) {
     let level = simd_level();
-    (0..pass.patches.len())
+    let start = || (pool.take(), SplatCounters::default(), Vec::new());
+    let done: Vec<_> = (0..pass.patches.len())
         .into_par_iter()
-        .map_init(
-            || pool.take(),
-            |scratch, index| {
-                splat_patch(pass, surfels, visibility, index, level, pool, scratch, keys)
-            },
-        )
-        .reduce(SplatCounters::default, SplatCounters::plus)
+        .fold(start, |(mut scratch, counters, mut landed), index| {
+            let work = PatchWork { pass, surfels, visibility, index, level, pool };
+            let more = work.run(&mut scratch, &mut landed);
+            (scratch, counters.plus(more), landed)
+        })
+        .map(|(_, counters, landed)| (counters, landed))
+        .collect();
+    let counters = done.iter().fold(SplatCounters::default(), |sum, (more, _)| sum.plus(*more));
+    (counters, done.into_iter().map(|(_, landed)| landed).collect())
 }
 
-#[expect(clippy::too_many_arguments, reason = "one private call")]
-fn splat_patch(
-    pass: &SplatPass<'_>,
-    surfels: &Surfels,
-    visibility: &Visibility,
+struct PatchWork<'a> {
+    pass: &'a SplatPass<'a>,
+    surfels: &'a Surfels,
+    visibility: &'a Visibility,
     index: usize,
     level: Level,
-    pool: &Pool<Scratch>,
-    scratch: &mut Scratch,
-    keys: &[AtomicU64],
-) -> SplatCounters {
-    let mut counters = SplatCounters::default();
-    let patch = &pass.patches[index];
-    let stride = patch.rect.width() + 2 * BORDER;
-    let Scratch { batches, hits, tile } = scratch;
-    let cameras = pass.patch_cameras[index] as usize..pass.patch_cameras[index + 1] as usize;
-    if cameras.is_empty() {
-        return counters;
-    }
-    fill_tile(tile, patch, visibility);
-    for camera in &pass.cameras[cameras] {
+    pool: &'a Pool<Scratch>,
+}
+
+impl PatchWork<'_> {
+    fn run(&self, scratch: &mut Scratch, landed: &mut Vec<Landed>) -> SplatCounters {
+        let Self { pass, surfels, visibility, index, level, pool } = *self;
+        let mut counters = SplatCounters::default();
+        let patch = &pass.patches[index];
+        let stride = patch.rect.width() * pass.samples + 2 * BORDER;
+        let cameras = pass.patch_cameras[index] as usize..pass.patch_cameras[index + 1] as usize;
+        if cameras.is_empty() {
+            return counters;
+        }
+        let Scratch { batches, packed, hits, tile } = scratch;
+        fill_tile(tile, patch, visibility, pass.samples);
+        for camera in &pass.cameras[cameras] {
+            let start = Instant::now();
+            batches.clear();
+            pass.batches.cull(camera, batches);
+            counters.cull_ns += nanoseconds(start, Instant::now());
+            counters.batches += batches.len() as u64;
+            let work = Projection { pass, surfels, camera, patch, stride };
+            let shared = Shared { work, visibility, level, pool };
+            counters = counters.plus(shared.project(batches, packed, hits, tile));
+        }
         let start = Instant::now();
-        batches.clear();
-        pass.batches.cull(camera, batches);
-        counters.cull_ns += nanoseconds(start, Instant::now());
-        counters.batches += batches.len() as u64;
-        let work = Projection { pass, surfels, camera, patch, stride };
-        let shared = Shared { work, visibility, level, pool };
-        counters = counters.plus(shared.project(batches, hits, tile));
+        self.resolve(tile, stride as usize, landed);
+        counters.splat_ns += nanoseconds(start, Instant::now());
+        counters
     }
-    for y in 0..patch.rect.height() {
-        let row = ((y + BORDER) * stride + BORDER) as usize;
-        let to = ((patch.rect.min[1] + y) * visibility.size.width + patch.rect.min[0]) as usize;
-        let n = patch.rect.width() as usize;
-        for (key, out) in tile[row..row + n].iter().zip(&keys[to..to + n]) {
-            if *key != FOREIGN {
-                out.store(*key, Ordering::Relaxed);
+
+    /// From the samples of the tile to the patch's pixels.
+    fn resolve(&self, tile: &[u64], stride: usize, landed: &mut Vec<Landed>) {
+        let rect = self.pass.patches[self.index].rect;
+        let side = self.pass.samples as usize;
+        let share = 1.0 / (side * side) as f32;
+        for y in rect.min[1]..rect.max[1] {
+            let row = (y - rect.min[1]) as usize * side + BORDER as usize;
+            for x in rect.min[0]..rect.max[0] {
+                let column = (x - rect.min[0]) as usize * side + BORDER as usize;
+                let (mut key, mut count, mut radiance) = (EMPTY, 0.0, Vec3::ZERO);
+                for j in 0..side {
+                    let at = (row + j) * stride + column;
+                    for &sample in &tile[at..at + side] {
+                        if sample == EMPTY || sample == FOREIGN {
+                            continue;
+                        }
+                        key = key.min(sample);
+                        count += 1.0;
+                        // The low half of a key is its surfel.
+                        #[expect(clippy::cast_possible_truncation, reason = "takes the low half")]
+                        let surfel = sample as u32 as usize;
+                        radiance += self.surfels.radiance[surfel];
+                    }
+                }
+                if key != EMPTY {
+                    landed.push(Landed {
+                        pixel: y * self.visibility.size.width + x,
+                        coverage: count * share,
+                        radiance: radiance * share,
+                        key,
+                    });
+                }
             }
         }
     }
-    counters
 }
 
 fn nanoseconds(from: Instant, to: Instant) -> u64 {
@@ -175,19 +290,25 @@ struct Shared<'a> {
 impl Shared<'_> {
     /// Projects and splats batches into `tile`. A wide camera sees nearly everything in a few pixels: its work is
     /// halved between threads, each with a tile of its own; the nearest key wins, whoever found it.
-    fn project(&self, batches: &[Batch], hits: &mut Hits, tile: &mut Vec<u64>) -> SplatCounters {
+    fn project(
+        &self,
+        batches: &[Batch],
+        packed: &mut Packed,
+        hits: &mut Hits,
+        tile: &mut Vec<u64>,
+    ) -> SplatCounters {
         let surfels: usize = batches.iter().map(|b| b.count as usize).sum();
         if surfels <= SHARE || batches.len() < 2 {
-            return self.project_in_turn(batches, hits, tile);
+            return self.project_in_turn(batches, packed, hits, tile);
         }
         let (left, right) = batches.split_at(batches.len() / 2);
         let mut other = self.pool.take();
-        let Scratch { hits: other_hits, tile: other_tile, .. } = &mut *other;
+        let Scratch { packed: other_packed, hits: other_hits, tile: other_tile, .. } = &mut *other;
         let (a, b) = rayon::join(
-            || self.project(left, hits, tile),
+            || self.project(left, packed, hits, tile),
             || {
-                fill_tile(other_tile, self.work.patch, self.visibility);
-                self.project(right, other_hits, other_tile)
+                fill_tile(other_tile, self.work.patch, self.visibility, self.work.pass.samples);
+                self.project(right, other_packed, other_hits, other_tile)
             },
         );
         for (key, found) in tile.iter_mut().zip(other_tile) {
@@ -198,55 +319,59 @@ impl Shared<'_> {
 
     fn project_in_turn(
         &self,
-        mut batches: &[Batch],
+        batches: &[Batch],
+        packed: &mut Packed,
         hits: &mut Hits,
         tile: &mut [u64],
     ) -> SplatCounters {
         let mut counters = SplatCounters::default();
         let mut last = Instant::now();
-        while !batches.is_empty() {
-            let taken = chunk(batches);
-            hits.clear(
-                MAX_IMAGES * taken.iter().map(|b| b.count as usize).sum::<usize>() + PADDING,
-            );
-            let (projections, valid) = dispatch!(self.level, simd => self.work.run::<_, Pair<f32x16<_>>>(simd, taken, hits));
+        let mut batches = batches.iter();
+        let (mut batch, mut from) = (batches.next(), 0);
+        while batch.is_some() {
+            packed.clear();
+            while let Some(open) = batch
+                && packed.len() < CHUNK
+            {
+                from += packed.add(self.work.surfels, self.work.camera.extent, open, from);
+                if from == open.count {
+                    (batch, from) = (batches.next(), 0);
+                }
+            }
+            let count = packed.len();
+            packed.pad();
+            hits.clear(MAX_IMAGES * count + PADDING);
+            let valid = dispatch!(self.level, simd => self.work.run::<_, Pair<f32x16<_>>>(simd, packed, count, hits));
             let projected = Instant::now();
             splat_hits(hits, self.work.pass.shape, self.work.stride as usize, tile);
             let done = Instant::now();
-            counters.projections += projections;
+            counters.projections += count as u64;
             counters.valid += valid;
             counters.project_ns += nanoseconds(last, projected);
             counters.splat_ns += nanoseconds(projected, done);
             last = done;
-            batches = &batches[taken.len()..];
         }
         counters
     }
 }
 
-/// The first batches whose surfels make up at most a chunk; at least one.
-fn chunk(batches: &[Batch]) -> &[Batch] {
-    let mut sum = 0;
-    let fits = |b: &&Batch| {
-        sum += b.count as usize;
-        sum <= CHUNK
-    };
-    let n = batches.iter().take_while(fits).count();
-    &batches[..n.max(1)]
-}
-
-fn fill_tile(tile: &mut Vec<u64>, patch: &Patch, visibility: &Visibility) {
-    let stride = (patch.rect.width() + 2 * BORDER) as usize;
+fn fill_tile(tile: &mut Vec<u64>, patch: &Patch, visibility: &Visibility, samples: u32) {
+    let side = samples as usize;
+    let stride = (patch.rect.width() * samples + 2 * BORDER) as usize;
     tile.clear();
-    tile.resize(stride * (patch.rect.height() + 2 * BORDER) as usize, FOREIGN);
+    tile.resize(stride * (patch.rect.height() * samples + 2 * BORDER) as usize, FOREIGN);
     for y in patch.rect.min[1]..patch.rect.max[1] {
         let from = (y * visibility.size.width + patch.rect.min[0]) as usize;
         let ids = &visibility.mirror_ids[from..from + patch.rect.width() as usize];
-        let at = (y - patch.rect.min[1] + BORDER) as usize * stride + BORDER as usize;
-        for (x, (key, &id)) in (patch.rect.min[0]..).zip(tile[at..].iter_mut().zip(ids)) {
+        let at = ((y - patch.rect.min[1]) as usize * side + BORDER as usize) * stride + BORDER as usize;
+        for (i, (x, &id)) in (patch.rect.min[0]..).zip(ids).enumerate() {
             debug_assert!(id != NONE_ID || patch.triangle.0 != NONE_ID);
-            let own = id == patch.triangle.0 && patch.cell.is_none_or(|c| c.contains(x, y));
-            *key = if own { EMPTY } else { FOREIGN };
+            if id == patch.triangle.0 && patch.cell.is_none_or(|c| c.contains(x, y)) {
+                for j in 0..side {
+                    let at = at + j * stride + i * side;
+                    tile[at..at + side].fill(EMPTY);
+                }
+            }
         }
     }
 }
@@ -281,39 +406,38 @@ pub(crate) struct Projection<'a> {
 }
 
 impl Projection<'_> {
-    /// Projects the batches; appends what lands in the tile; returns the pairs projected and those with an image.
+    /// Projects what is packed; appends what lands in the tile; returns how many have an image.
     #[inline(always)]
     fn run<S: Simd, V: Vector<S>>(
         &self,
         simd: S,
-        batches: &[Batch],
+        packed: &Packed,
+        count: usize,
         hits: &mut Hits,
-    ) -> (u64, u64) {
-        let (mut projections, mut valid) = (0, 0);
+    ) -> u64 {
+        let mut valid = 0;
         let offset = match self.pass.shape {
             SplatShape::Square1 => BORDER as f32,
             SplatShape::Square2 => BORDER as f32 - 0.5,
         };
         let zero = V::broadcast(simd, 0.0);
         let width = V::broadcast(simd, (self.stride - BORDER) as f32);
-        let height = V::broadcast(simd, (self.patch.rect.height() + BORDER) as f32);
+        let rows = self.patch.rect.height() * self.pass.samples;
+        let height = V::broadcast(simd, (rows + BORDER) as f32);
         let mut len = 0;
-        for batch in batches {
-            let lo = V::broadcast(simd, batch.lambda[0]);
-            let hi = V::broadcast(simd, batch.lambda[1]);
-            let end = batch.first + batch.count;
-            let mut at = batch.first;
-            projections += u64::from(batch.count);
-            while at < end {
-                let i = at as usize;
-                let lanes = (end - at).min(V::LANES);
-                let active = V::mask(simd, (1u64 << lanes) - 1);
-                let v1 = &self.camera.camera.v1;
-                let q = [
-                    V::load(simd, &self.surfels.x[i..]) - v1[0],
-                    V::load(simd, &self.surfels.y[i..]) - v1[1],
-                    V::load(simd, &self.surfels.z[i..]) - v1[2],
-                ];
+        let mut i = 0;
+        while i < count {
+            let lanes = (count - i).min(V::LANES as usize);
+            let active = V::mask(simd, (1u64 << lanes) - 1);
+            let v1 = &self.camera.camera.v1;
+            let q = [
+                V::load(simd, &packed.x[i..]) - v1[0],
+                V::load(simd, &packed.y[i..]) - v1[1],
+                V::load(simd, &packed.z[i..]) - v1[2],
+            ];
+            let lo = V::load(simd, &packed.lo[i..]);
+            let hi = V::load(simd, &packed.hi[i..]);
+            let size = V::load(simd, &packed.size[i..]);
                 let mut seen = 0u64;
                 let mut taken = !active;
                 for image in project(&self.camera.camera, q, lo, hi).as_slice() {
@@ -334,37 +458,42 @@ impl Projection<'_> {
                     let lands = drawn & lands;
                     let cell = [x.floor(), y.floor()];
                     let d = self.direction(image);
-                    let fills = self.fills(image, d, [cell[0] - x, cell[1] - y]);
+                    let fills = self.fills(image, d, size, [cell[0] - x, cell[1] - y]);
                     V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
                     self.depth(image, d).compress(lands, &mut hits.depth[len..]);
-                    V::compress_numbers(simd, at, lands, &mut hits.surfel[len..]);
+                    V::compress_numbers(simd, &packed.surfel[i..], lands, &mut hits.surfel[len..]);
                     len += V::bits(lands).count_ones() as usize;
                 }
                 valid += u64::from(seen.count_ones());
-                at += lanes;
-            }
+            i += lanes;
         }
         hits.len = len;
-        (projections, valid)
+        valid
     }
 
     /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first pixel
     /// begins.
     #[inline(always)]
-    fn fills<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3], from: [R; 2]) -> R {
-        let [base, per_lambda] = self.camera.per_px;
+    fn fills<R: Real<Scalar = f32>>(
+        &self,
+        image: &Image<R>,
+        d: [R; 3],
+        size: R,
+        from: [R; 2],
+    ) -> R {
+        let [base, per_lambda] = self.camera.per_sample;
         let right = along(base[0], per_lambda[0], image.lambda);
         let down = along(base[1], per_lambda[1], image.lambda);
         // Squared distance from the surfel of the ray through a point (x, y) pixels away: a x² + 2 b x y + c y².
         let (one, zero) = (image.lambda.splat(1.0), image.lambda.splat(0.0));
         let per_length = one / dot(d, d);
         let (right_d, down_d) = (dot(right, d), dot(down, d));
-        let a = dot(right, right) - right_d * right_d * per_length;
-        let b = dot(right, down) - right_d * down_d * per_length;
-        let c = dot(down, down) - down_d * down_d * per_length;
+        let a = (dot(right, right) - right_d * right_d * per_length) * size;
+        let b = (dot(right, down) - right_d * down_d * per_length) * size;
+        let c = (dot(down, down) - down_d * down_d * per_length) * size;
         // A disk of that distance holds a surfel. Where it is seen so long that it leaves the splat's reach, it has
         // to be as much wider to hold one within it.
-        let reach = self.pass.shape.reach_px();
+        let reach = self.pass.shape.reach();
         let least = (a * c - b * b) / (a + c) * (reach * reach);
         let mut fills = zero;
         let pixels: &[_] = match self.pass.shape {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::super::FrameInput;
 use super::footprint::Footprint;
-use super::guard::{self, Guard};
+use super::guard::{self, Guard, Reach};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
 use crate::camera::RayScale;
@@ -15,8 +15,8 @@ use crate::camera::three_ray::{BoxTest, Rays, ThreeRay, ViewVolume, array};
 use crate::cull::test_children;
 use crate::geometry::Similarity;
 use crate::geometry::lanes::simd_level;
-use crate::plan::{CameraInstance, SplatShape};
-use crate::scene::prepared::PreparedScene;
+use crate::plan::{CameraInstance, Gaze, SplatShape};
+use crate::scene::prepared::{PreparedObject, PreparedScene};
 use crate::visibility::Patch;
 
 /// Surfels a hair behind the mirror still count as touching it: this share of the eye's distance (untuned).
@@ -26,12 +26,24 @@ const CONTACT: f64 = 1e-5;
 const SHORTENING: f64 = 1e3;
 /// Surfels are so evenly spread that a disk of this many of their radii about any point of a surface holds one.
 const EVENNESS: f64 = 1.5;
+/// For the rounding of a gaze's cosine.
+const GAZE_SLACK: f64 = 1e-5;
 
 /// What the cameras depend on besides the scene.
 #[derive(Clone, Copy)]
 pub(super) struct CameraSettings {
     pub(super) ray_scale: RayScale,
     pub(super) shape: SplatShape,
+    pub(super) samples: u32,
+}
+
+impl CameraSettings {
+    fn reach(self) -> Reach {
+        let side = f64::from(self.samples);
+        // The outermost samples lie on a square.
+        let samples = (side - 1.0) / side * std::f64::consts::FRAC_1_SQRT_2;
+        Reach { samples, splat: f64::from(self.shape.reach()) / side }
+    }
 }
 
 /// The cameras of all patches, by patch and object, and where each patch's begin.
@@ -115,7 +127,7 @@ fn of_patch(
     let position = eye.position.as_dvec3();
     let facing = DVec3::from_array(mirror.facing(eye.position));
     let corners_px = rays.origins.map(|v| homogeneous(eye, v));
-    let around = rays.grown(guard::around(&corners_px, patch, settings.shape));
+    let around = rays.grown(guard::around(&corners_px, patch, settings.reach()));
     let volume = ViewVolume::<f32>::new(&around);
     let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
     let size = rays.origins.map(|v| (v - position).length());
@@ -127,6 +139,7 @@ fn of_patch(
     ];
     // Most patches see no object.
     let mut exact = None;
+    let samples = f64::from(settings.samples);
     for (g, group) in top.groups.iter().enumerate() {
         let tested = dispatch!(top.level, simd => test_children(simd, group, &volume, BoxTest::Slab, lambda));
         let mut bits = tested.meets & group.used;
@@ -140,8 +153,8 @@ fn of_patch(
             let radius = EVENNESS * f64::from(scene.objects[object].extent);
             let (front, screen, guard) = exact.get_or_insert_with(|| {
                 let front = linear_form(patch.corners.map(|w| w.dot(facing)));
-                let screen = screen_forms(eye, patch, rays.origins);
-                (front, screen, Guard::new(&corners_px, visibility, patch, settings.shape))
+                let screen = screen_forms(eye, patch, rays.origins, samples);
+                (front, screen, Guard::new(&corners_px, visibility, patch, settings.reach()))
             });
             let before = corners_px.iter().all(|c| c.z > 0.0);
             let seen_px = corners_px.map(|c| if before { c.truncate() / c.z } else { DVec2::NAN });
@@ -161,14 +174,36 @@ fn of_patch(
                 several: several.map_or([1.0, 0.0], |(a, b)| [a as f32, b as f32]),
                 scale: to_scene.scale as f32,
                 screen: *screen,
-                per_px: [footprint.base, footprint.per_lambda]
-                    .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / radius))),
+                per_sample: [footprint.base, footprint.per_lambda]
+                    .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / (radius * samples)))),
+                gaze: gaze(&scene.objects[object], &own_grown),
+                extent: scene.objects[object].extent,
+                footprint: footprint.quadratics().map(|q| q.map(|x| x as f32)),
                 guard: array(guard),
                 front: *front,
                 from_eye: [0, 1, 2].map(|k| linear_form(from_eye.map(|v| v[k]))),
             });
         }
     }
+}
+
+/// See [`CameraInstance::gaze`]. From inside an object its far side is seen from behind.
+#[expect(clippy::cast_possible_truncation, reason = "rounded once, with a margin")]
+fn gaze(object: &PreparedObject, rays: &Rays) -> Option<Gaze> {
+    let bounds = object.tree.bounds();
+    let outside = |v: &DVec3| !bounds.contains(v.as_vec3());
+    if !object.closed || !rays.origins.iter().all(outside) {
+        return None;
+    }
+    let axis = rays.axis()?;
+    let cosines = rays.directions.iter().map(|d| d.normalize_or_zero().dot(axis));
+    let cosine = cosines.fold(1.0, f64::min) - GAZE_SLACK;
+    let sine = (1.0 - cosine * cosine).sqrt();
+    (cosine > 0.0).then_some(Gaze {
+        axis: array(axis),
+        cosine: cosine as f32,
+        sine: sine as f32,
+    })
 }
 
 fn rays_in(to_scene: &Similarity, rays: &Rays) -> Rays {
@@ -196,12 +231,12 @@ fn homogeneous(eye: &Eye, v: DVec3) -> DVec3 {
     )
 }
 
-fn screen_forms(eye: &Eye, patch: &Patch, corners: [DVec3; 3]) -> [[f32; 3]; 3] {
+fn screen_forms(eye: &Eye, patch: &Patch, corners: [DVec3; 3], samples: f64) -> [[f32; 3]; 3] {
     let [left, top] = patch.rect.min.map(f64::from);
     let h = corners.map(|v| homogeneous(eye, v));
     [
-        linear_form(h.map(|h| h.x - left * h.z)),
-        linear_form(h.map(|h| h.y - top * h.z)),
+        linear_form(h.map(|h| (h.x - left * h.z) * samples)),
+        linear_form(h.map(|h| (h.y - top * h.z) * samples)),
         linear_form(h.map(|h| h.z)),
     ]
 }

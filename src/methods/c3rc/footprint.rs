@@ -27,6 +27,17 @@ impl Footprint {
         }
     }
 
+    /// The matrix [a b; b c] that gives the squared distance across the axis by the distance in pixels, as
+    /// quadratics in λ.
+    pub(super) fn quadratics(&self) -> [[f64; 3]; 3] {
+        let across = |m: &DMat3| [m.x_axis, m.y_axis].map(|v| v.reject_from(self.axis));
+        let ([x0, y0], [x1, y1]) = (across(&self.base), across(&self.per_lambda));
+        let product = |p0: DVec3, p1: DVec3, q0: DVec3, q1: DVec3| {
+            [p0.dot(q0), p0.dot(q1) + p1.dot(q0), p1.dot(q1)]
+        };
+        [product(x0, x1, x0, x1), product(x0, x1, y0, y1), product(y0, y1, y0, y1)]
+    }
+
     /// How many pixels a unit across the rays covers at most, at λ. Not a number or infinite where T(λ) has no area.
     pub(super) fn px_per_unit(&self, lambda: f64) -> f64 {
         let map = self.base + self.per_lambda * lambda;

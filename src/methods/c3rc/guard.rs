@@ -4,7 +4,6 @@
 use glam::DVec3;
 
 use super::footprint::Footprint;
-use crate::plan::SplatShape;
 use crate::visibility::{Patch, Visibility};
 
 /// Furthest guard as a weight. Rays are not extrapolated further than this: a triangle much thinner than a
@@ -13,6 +12,15 @@ const MAX_GUARD: f64 = 0.5;
 /// Added for the rounding of weights to f32.
 const SLACK: f64 = 1e-3;
 
+/// What has to be seen of a patch, in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    /// How far a pixel's samples lie from its centre.
+    pub(super) samples: f64,
+    /// How far a splat may lie from a sample that it covers.
+    pub(super) splat: f64,
+}
+
 /// Shares of the splat's reach at which margins are computed; between them a chord is taken.
 const STEPS: [f64; 5] = [0.0, 0.125, 0.25, 0.5, 1.0];
 
@@ -20,7 +28,7 @@ const STEPS: [f64; 5] = [0.0, 0.125, 0.25, 0.5, 1.0];
 pub(super) struct Guard {
     /// By [`STEPS`].
     margins: [DVec3; STEPS.len()],
-    reach_px: f64,
+    reach: Reach,
 }
 
 impl Guard {
@@ -29,10 +37,9 @@ impl Guard {
         corners: &[DVec3; 3],
         visibility: &Visibility,
         patch: &Patch,
-        shape: SplatShape,
+        reach: Reach,
     ) -> Self {
-        let reach_px = shape.reach_px().into();
-        Self { margins: margins(corners, visibility, patch, reach_px), reach_px }
+        Self { margins: margins(corners, visibility, patch, reach), reach }
     }
 
     /// The margins for surfels of which a disk of this radius about any point of a surface holds one, seen at λ
@@ -41,7 +48,7 @@ impl Guard {
         let [lo, hi] = range;
         let share = [lo, 0.5 * (lo + hi), hi]
             .into_iter()
-            .map(|lambda| radius * footprint.px_per_unit(lambda) / self.reach_px)
+            .map(|lambda| radius * footprint.px_per_unit(lambda) / self.reach.splat)
             .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
         // The least weight over points that move apart is a concave function of how far they do: the chord is on
         // the safe side. Nothing is found for what is not a number.
@@ -59,14 +66,14 @@ impl Guard {
 /// tan 22.5°.
 const OCTAGON: f64 = std::f64::consts::SQRT_2 - 1.0;
 
-/// The margins m such that what lies at most a share of `reach_px` from the centre of a pixel of the
+/// The margins m such that what lies at most a share of the splat's reach from the samples of a pixel of the
 /// patch has weights of at least -m_i. Negative where the patch's pixels stay away from an edge (what lies there may
 /// be hidden).
 fn margins(
     corners: &[DVec3; 3],
     visibility: &Visibility,
     patch: &Patch,
-    reach_px: f64,
+    reach: Reach,
 ) -> [DVec3; STEPS.len()] {
     let weights = Weights::new(corners);
     let mut least = [DVec3::INFINITY; STEPS.len()];
@@ -74,7 +81,8 @@ fn margins(
         let Some((first, last)) = run(visibility, patch, y) else { continue };
         for (least, step) in least.iter_mut().zip(STEPS) {
             // Half of the octagon about the disk of that radius, about the first pixel and, mirrored, the last.
-            let (r, s) = (step * reach_px, step * reach_px * OCTAGON);
+            let r = reach.samples + step * reach.splat;
+            let s = r * OCTAGON;
             for (dx, dy) in [(r, s), (r, -s), (s, r), (s, -r)] {
                 let y = f64::from(y) + 0.5 + dy;
                 *least = least.min(weights.at(f64::from(first) + 0.5 - dx, y));
@@ -90,9 +98,9 @@ fn margin(least: DVec3) -> DVec3 {
 }
 
 /// Margins that are never less than those of any [`Guard`] of the patch, at once: for what need not be exact.
-pub(super) fn around(corners: &[DVec3; 3], patch: &Patch, shape: SplatShape) -> DVec3 {
+pub(super) fn around(corners: &[DVec3; 3], patch: &Patch, reach: Reach) -> DVec3 {
     let weights = Weights::new(corners);
-    let reach = f64::from(shape.reach_px()) - 0.5;
+    let reach = reach.samples + reach.splat - 0.5;
     let [left, top] = patch.rect.min.map(|v| f64::from(v) - reach);
     let [right, bottom] = patch.rect.max.map(|v| f64::from(v) + reach);
     let corners = [(left, top), (right, top), (left, bottom), (right, bottom)];
@@ -181,12 +189,13 @@ mod tests {
         let px = [DVec2::new(5.3, 4.1), DVec2::new(33.0, 9.7), DVec2::new(14.2, 24.6)];
         let (corners, visibility, patch) = setting(px);
         let weights = Weights::new(&corners);
-        for shape in [SplatShape::Square1, SplatShape::Square2] {
-            let guard = Guard::new(&corners, &visibility, &patch, shape);
-            let around = around(&corners, &patch, shape);
+        for (samples, splat) in [(0.0, 0.5), (0.0, 1.0), (0.35, 0.5)] {
+            let reach = Reach { samples, splat };
+            let guard = Guard::new(&corners, &visibility, &patch, reach);
+            let around = around(&corners, &patch, reach);
             for (step, margins) in STEPS.into_iter().zip(guard.margins) {
                 assert!(margins.cmple(around).all(), "{margins} is more than {around}");
-                let reach = step * f64::from(shape.reach_px());
+                let reach = samples + step * splat;
                 let mut tight = DVec3::NEG_INFINITY;
                 for (i, _) in visibility.mirror_ids.iter().enumerate().filter(|(_, id)| **id == 3) {
                     for turn in 0..16 {
@@ -207,7 +216,7 @@ mod tests {
     fn margins_grow_with_the_distance_of_surfels_and_end_at_the_splat() {
         let px = [DVec2::new(5.3, 4.1), DVec2::new(33.0, 9.7), DVec2::new(14.2, 24.6)];
         let (corners, visibility, patch) = setting(px);
-        let guard = Guard::new(&corners, &visibility, &patch, SplatShape::Square2);
+        let guard = Guard::new(&corners, &visibility, &patch, Reach { samples: 0.0, splat: 1.0 });
         let origins = px.map(|p| (p * 0.01).extend(0.0));
         let rays = Rays { origins, directions: origins.map(|v| v + DVec3::Z) };
         let footprint = Footprint::new(&px, &rays);

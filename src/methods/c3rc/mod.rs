@@ -40,6 +40,22 @@ static INFO: MethodInfo = MethodInfo {
             is_quality_knob: true,
         },
         ParamInfo {
+            id: "samples",
+            about: "samples along a pixel's side, each with the nearest surfel of its own",
+            unit: "",
+            kind: ParamKind::Integer(1, 4),
+            default: Value::Integer(1),
+            is_quality_knob: true,
+        },
+        ParamInfo {
+            id: "detail",
+            about: "splats a pixel and layer: what would be more is drawn as representatives; 0: every surfel",
+            unit: "",
+            kind: ParamKind::Integer(0, 64),
+            default: Value::Integer(0),
+            is_quality_knob: true,
+        },
+        ParamInfo {
             id: "depth",
             about: "what decides which surfel is nearest (push-back: the paper's key)",
             unit: "",
@@ -101,13 +117,15 @@ impl Method for C3rc {
             "square1" => SplatShape::Square1,
             _ => SplatShape::Square2,
         };
+        let samples = params.integer("samples");
         let settings =
-            cameras::CameraSettings { ray_scale: ray_scale(params.choice("ray-scale")), shape };
+            cameras::CameraSettings { ray_scale: ray_scale(params.choice("ray-scale")), shape, samples };
         let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
         let mut list = Vec::new();
         patches(frame.eye, frame.visibility, corners, &mut PatchScratch::default(), &mut list);
         let (cameras, patch_cameras) = cameras::cameras(frame, &list, settings);
         out.times.cameras_ms = milliseconds(start);
+        let detail = params.integer("detail") as f32;
         let test = match params.choice("test") {
             "none" => BoxTest::None,
             "interval" => BoxTest::Interval,
@@ -119,8 +137,9 @@ impl Method for C3rc {
             patches: list,
             cameras,
             patch_cameras,
-            batches: Box::new(Culler::new(scene, test)),
+            batches: Box::new(Culler::new(scene, test, detail)),
             shape,
+            samples,
             depth: match params.choice("depth") {
                 "push-back" => DepthKey::PushBack,
                 _ => DepthKey::Lambda,

@@ -57,10 +57,11 @@ pub fn visible_mirrors(
     }
 }
 
-/// [`reflected_ray`] of each sample; empty rays (see [`Ray`]) where there is none.
+/// [`reflected_ray`] of each sample; empty rays (see [`Ray`]) where there is none, or the sample names no triangle of
+/// `mirrors`.
 ///
 /// # Panics
-/// If the slices differ in length, or a sample names a triangle that `mirrors` does not have.
+/// If the slices differ in length.
 pub fn reflected_rays(
     eye: &Eye,
     samples: &[PictureSample],
@@ -72,8 +73,8 @@ pub fn reflected_rays(
     assert_eq!(samples.len(), rays.len(), "a ray for every sample");
     let none = Ray { origin: Vec3::ZERO, direction: Vec3::ZERO, t_min: 0.0, t_max: -1.0 };
     samples.par_iter().with_min_len(CHUNK).zip(rays).for_each(|(sample, ray)| {
-        let mirror = &mirrors[sample.mirror_triangle as usize];
-        let made = reflected_ray(eye, sample.px, mirror, source, scale);
+        let mirror = mirrors.get(sample.mirror_triangle as usize);
+        let made = mirror.and_then(|m| reflected_ray(eye, sample.px, m, source, scale));
         *ray = made.map_or(none, |(origin, direction)| Ray::new(origin, direction));
     });
 }
