@@ -28,6 +28,8 @@ pub struct CameraInstance {
     pub per_sample: [[[f32; 3]; 2]; 2],
     /// Where the rays go, if what faces away from all of them is hidden.
     pub gaze: Option<Gaze>,
+    /// The object's first representative: surfels from there on have radii of their own.
+    pub representatives: u32,
     /// Radius of the disk that the object's surfels stand for; infinite if that is not known.
     pub extent: f32,
     /// What a pixel sees at λ: the symmetric matrix [a b; b c] that gives the squared distance across the rays of

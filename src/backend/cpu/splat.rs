@@ -114,35 +114,35 @@ impl Packed {
     }
 
     /// Adds as much of `batch` as there is room for, from its surfel `from` on; returns how much.
-    fn add(&mut self, surfels: &Surfels, extent: f32, batch: &Batch, from: u32) -> u32 {
+    fn add(&mut self, surfels: &Surfels, camera: &CameraInstance, batch: &Batch, from: u32) -> u32 {
         let room = u32::try_from(CHUNK - self.len()).unwrap_or(0);
         let count = (batch.count - from).min(room);
         let first = batch.first + from * batch.stride;
+        let end = self.len() + count as usize;
         if batch.stride == 1 {
             let range = first as usize..(first + count) as usize;
             self.x.extend_from_slice(&surfels.x[range.clone()]);
             self.y.extend_from_slice(&surfels.y[range.clone()]);
             self.z.extend_from_slice(&surfels.z[range.clone()]);
-            let sizes = surfels.extent[range].iter().map(|e| (extent / e) * (extent / e));
-            self.size.extend(sizes);
             self.surfel.extend(first..first + count);
+            if first >= camera.representatives && camera.extent.is_finite() {
+                for extent in &surfels.extent[range] {
+                    let share = camera.extent / extent;
+                    self.size.push(share * share);
+                }
+            }
         } else {
-            let share = 1.0 / batch.stride as f32;
             for surfel in (first..).step_by(batch.stride as usize).take(count as usize) {
                 let i = surfel as usize;
                 self.x.push(surfels.x[i]);
                 self.y.push(surfels.y[i]);
                 self.z.push(surfels.z[i]);
-                self.size.push(share);
                 self.surfel.push(surfel);
             }
         }
-        if !extent.is_finite() {
-            let n = self.size.len();
-            self.size[n - count as usize..].fill(1.0);
-        }
-        self.lo.resize(self.lo.len() + count as usize, batch.lambda[0]);
-        self.hi.resize(self.hi.len() + count as usize, batch.lambda[1]);
+        self.size.resize(end, 1.0 / batch.stride as f32);
+        self.lo.resize(end, batch.lambda[0]);
+        self.hi.resize(end, batch.lambda[1]);
         count
     }
 
@@ -333,7 +333,7 @@ impl Shared<'_> {
             while let Some(open) = batch
                 && packed.len() < CHUNK
             {
-                from += packed.add(self.work.surfels, self.work.camera.extent, open, from);
+                from += packed.add(self.work.surfels, self.work.camera, open, from);
                 if from == open.count {
                     (batch, from) = (batches.next(), 0);
                 }

@@ -177,6 +177,7 @@ fn of_patch(
                 per_sample: [footprint.base, footprint.per_lambda]
                     .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / (radius * samples)))),
                 gaze: gaze(&scene.objects[object], &own_grown),
+                representatives: scene.objects[object].representatives.start,
                 extent: scene.objects[object].extent,
                 footprint: footprint.quadratics().map(|q| q.map(|x| x as f32)),
                 guard: array(guard),
