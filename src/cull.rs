@@ -13,15 +13,13 @@ use crate::scene::prepared::PreparedScene;
 pub struct Culler<'a> {
     scene: &'a PreparedScene,
     test: BoxTest,
-    detail: f32,
     level: Level,
 }
 
 impl<'a> Culler<'a> {
-    /// Culls against `scene` with `test`. A node that would be seen as less than 1/`detail` of a pixel is taken as
-    /// one representative; 0: no node is.
-    pub fn new(scene: &'a PreparedScene, test: BoxTest, detail: f32) -> Self {
-        Self { scene, test, detail, level: simd_level() }
+    /// Culls against `scene` with `test`.
+    pub fn new(scene: &'a PreparedScene, test: BoxTest) -> Self {
+        Self { scene, test, level: simd_level() }
     }
 }
 
@@ -36,8 +34,8 @@ impl BatchSource for Culler<'_> {
             first: object.surfels.start,
             representatives: object.representatives.start,
             footprint: &camera.footprint,
-            gaze: camera.gaze.filter(|_| self.detail > 0.0),
-            per_pixel: self.detail * std::f32::consts::FRAC_PI_2,
+            gaze: camera.gaze.filter(|_| camera.detail > 0.0),
+            per_pixel: camera.detail * std::f32::consts::FRAC_PI_2,
         };
         let from = out.len();
         if self.test == BoxTest::None {
@@ -69,7 +67,7 @@ struct Walk<'a> {
     footprint: &'a [[f32; 3]; 3],
     gaze: Option<Gaze>,
     /// π/2 representatives' radii squared are to be less than this many times the footprint; 0: see
-    /// [`Culler::new`].
+    /// [`CameraInstance::detail`].
     per_pixel: f32,
 }
 

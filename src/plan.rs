@@ -30,6 +30,10 @@ pub struct CameraInstance {
     pub gaze: Option<Gaze>,
     /// The object's first representative: surfels from there on have radii of their own.
     pub representatives: u32,
+    /// A node that would be seen as less than 1/`detail` of a pixel is taken as one representative; 0: no node is.
+    pub detail: f32,
+    /// What `per_sample` is measured in.
+    pub radius: f32,
     /// Radius of the disk that the object's surfels stand for; infinite if that is not known.
     pub extent: f32,
     /// What a pixel sees at λ: the symmetric matrix [a b; b c] that gives the squared distance across the rays of
@@ -78,6 +82,8 @@ pub trait BatchSource: Send + Sync {
 /// Which samples a projected surfel covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplatShape {
+    /// Those that the surfel's disk is seen on.
+    Ellipse,
     /// The one that it falls on.
     Square1,
     /// The 2 × 2 around it.
@@ -85,10 +91,14 @@ pub enum SplatShape {
     Square2,
 }
 
+/// An ellipse's half axes end at so many samples: beyond it a caustic is near, or the surfels are too few.
+pub const LARGEST_ELLIPSE: f32 = 8.0;
+
 impl SplatShape {
     /// How far, along x and y, an image may lie from a sample that it covers, in samples.
     pub fn reach(self) -> f32 {
         match self {
+            Self::Ellipse => LARGEST_ELLIPSE,
             Self::Square1 => 0.5,
             Self::Square2 => 1.0,
         }

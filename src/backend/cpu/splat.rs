@@ -15,7 +15,7 @@ use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
 use crate::geometry::lanes::{Pair, Real, Vector, dot, simd_level};
 use crate::geometry::surfel::PADDING;
-use crate::plan::{Batch, CameraInstance, DepthKey, SplatPass, SplatShape};
+use crate::plan::{Batch, CameraInstance, DepthKey, LARGEST_ELLIPSE, SplatPass, SplatShape};
 use crate::visibility::{NONE_ID, Patch, Visibility};
 
 /// Nothing landed here.
@@ -29,6 +29,9 @@ pub(crate) const FILLS: u64 = 1 << 63;
 pub(crate) const EDGE_TOLERANCE: f32 = 1e-3;
 /// Surfels projected at a time before they are splatted.
 const CHUNK: usize = 1024;
+/// How much deeper than the middle of a disk its rim counts, in radii: more than the slope of most surfaces lets the
+/// rim of a neighbour come nearer (untuned).
+const RISE: f32 = 2.0;
 /// Of a surfel in a camera.
 const MAX_IMAGES: usize = 3;
 /// A camera with more surfels than this shares them with idle threads (untuned).
@@ -164,6 +167,9 @@ struct Hits {
     depth: Vec<f32>,
     surfel: Vec<u32>,
     len: usize,
+    /// Of ellipses instead of `cell`: the middle, the form a x² + 2 b x y + c y² that is 1 at the rim, half the
+    /// width and height, what the depth grows by towards the rim.
+    ellipse: [Vec<f32>; 8],
 }
 
 impl Hits {
@@ -174,6 +180,9 @@ impl Hits {
             self.cell.resize(room, 0);
             self.depth.resize(room, 0.0);
             self.surfel.resize(room, 0);
+            for list in &mut self.ellipse {
+                list.resize(room, 0.0);
+            }
         }
     }
 }
@@ -343,7 +352,10 @@ impl Shared<'_> {
             hits.clear(MAX_IMAGES * count + PADDING);
             let valid = dispatch!(self.level, simd => self.work.run::<_, Pair<f32x16<_>>>(simd, packed, count, hits));
             let projected = Instant::now();
-            splat_hits(hits, self.work.pass.shape, self.work.stride as usize, tile);
+            match self.work.pass.shape {
+                SplatShape::Ellipse => self.work.splat_ellipses(hits, tile),
+                shape => splat_hits(hits, shape, self.work.stride as usize, tile),
+            }
             let done = Instant::now();
             counters.projections += count as u64;
             counters.valid += valid;
@@ -384,6 +396,7 @@ fn splat_hits(hits: &Hits, shape: SplatShape, stride: usize, tile: &mut [u64]) {
         let slot = (cell >> 4) as usize;
         let fills = u64::from(cell) << 60;
         match shape {
+            SplatShape::Ellipse => unreachable!("drawn by splat_ellipses"),
             SplatShape::Square1 => tile[slot] = tile[slot].min(key | (fills << 3 & FILLS)),
             SplatShape::Square2 => {
                 let block = &mut tile[slot..slot + stride + 2];
@@ -393,6 +406,16 @@ fn splat_hits(hits: &Hits, shape: SplatShape, stride: usize, tile: &mut [u64]) {
             }
         }
     }
+}
+
+/// An ellipse's form (see [`Projection::form`]) that ends at [`LARGEST_ELLIPSE`], and half its width and height.
+#[inline(always)]
+fn capped<R: Real<Scalar = f32>>([a, b, c]: [R; 3]) -> ([R; 3], [R; 2]) {
+    let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
+    let (a, c) = (a.max(a.splat(0.0)) + least, c.max(c.splat(0.0)) + least);
+    let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
+    let most = a.splat(LARGEST_ELLIPSE);
+    ([a, b, c], [(c * inverse).sqrt().min(most), (a * inverse).sqrt().min(most)])
 }
 
 /// The projection of batches by one camera.
@@ -417,10 +440,10 @@ impl Projection<'_> {
     ) -> u64 {
         let mut valid = 0;
         let offset = match self.pass.shape {
-            SplatShape::Square1 => BORDER as f32,
+            SplatShape::Ellipse | SplatShape::Square1 => BORDER as f32,
             SplatShape::Square2 => BORDER as f32 - 0.5,
         };
-        let zero = V::broadcast(simd, 0.0);
+        let (zero, one) = (V::broadcast(simd, 0.0), V::broadcast(simd, 1.0));
         let width = V::broadcast(simd, (self.stride - BORDER) as f32);
         let rows = self.patch.rect.height() * self.pass.samples;
         let height = V::broadcast(simd, (rows + BORDER) as f32);
@@ -453,14 +476,42 @@ impl Projection<'_> {
                         continue;
                     }
                     let [x, y, lands] = self.place(image, offset);
-                    let lands =
-                        zero.lt(lands) & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
-                    let lands = drawn & lands;
-                    let cell = [x.floor(), y.floor()];
                     let d = self.direction(image);
-                    let fills = self.fills(image, d, size, [cell[0] - x, cell[1] - y]);
-                    V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
-                    self.depth(image, d).compress(lands, &mut hits.depth[len..]);
+                    let depth = self.depth(image, d);
+                    let form = self.form(image, d, size);
+                    let before = zero.lt(lands);
+                    let lands;
+                    if self.pass.shape == SplatShape::Ellipse {
+                        let (form, [wide, high]) = capped(form);
+                        lands = drawn
+                            & before
+                            & zero.le(x + wide)
+                            & (x - wide).lt(width)
+                            & zero.le(y + high)
+                            & (y - high).lt(height);
+                        if !V::any(lands) {
+                            continue;
+                        }
+                        let rise = (one / size).sqrt() * (self.camera.radius * self.camera.scale * RISE);
+                        let values = [x, y, form[0], form[1], form[2], wide, high, rise];
+                        for k in 0..values.len() {
+                            values[k].compress(lands, &mut hits.ellipse[k][len..]);
+                        }
+                    } else {
+                        lands = drawn
+                            & before
+                            & zero.le(x)
+                            & x.lt(width)
+                            & zero.le(y)
+                            & y.lt(height);
+                        if !V::any(lands) {
+                            continue;
+                        }
+                        let cell = [x.floor(), y.floor()];
+                        let fills = self.fills(form, [cell[0] - x, cell[1] - y]);
+                        V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
+                    }
+                    depth.compress(lands, &mut hits.depth[len..]);
                     V::compress_numbers(simd, &packed.surfel[i..], lands, &mut hits.surfel[len..]);
                     len += V::bits(lands).count_ones() as usize;
                 }
@@ -471,32 +522,34 @@ impl Projection<'_> {
         valid
     }
 
-    /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first pixel
-    /// begins.
+    /// a, b, c: the squared distance a x² + 2 b x y + c y² from the surfel of the ray through a place (x, y) samples
+    /// away, in the surfel's radius. `d`: the ray's direction.
     #[inline(always)]
-    fn fills<R: Real<Scalar = f32>>(
-        &self,
-        image: &Image<R>,
-        d: [R; 3],
-        size: R,
-        from: [R; 2],
-    ) -> R {
+    fn form<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3], size: R) -> [R; 3] {
         let [base, per_lambda] = self.camera.per_sample;
         let right = along(base[0], per_lambda[0], image.lambda);
         let down = along(base[1], per_lambda[1], image.lambda);
-        // Squared distance from the surfel of the ray through a point (x, y) pixels away: a x² + 2 b x y + c y².
-        let (one, zero) = (image.lambda.splat(1.0), image.lambda.splat(0.0));
-        let per_length = one / dot(d, d);
+        let per_length = size.splat(1.0) / dot(d, d);
         let (right_d, down_d) = (dot(right, d), dot(down, d));
-        let a = (dot(right, right) - right_d * right_d * per_length) * size;
-        let b = (dot(right, down) - right_d * down_d * per_length) * size;
-        let c = (dot(down, down) - down_d * down_d * per_length) * size;
+        [
+            (dot(right, right) - right_d * right_d * per_length) * size,
+            (dot(right, down) - right_d * down_d * per_length) * size,
+            (dot(down, down) - down_d * down_d * per_length) * size,
+        ]
+    }
+
+    /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first sample
+    /// begins.
+    #[inline(always)]
+    fn fills<R: Real<Scalar = f32>>(&self, [a, b, c]: [R; 3], from: [R; 2]) -> R {
+        let (one, zero) = (a.splat(1.0), a.splat(0.0));
         // A disk of that distance holds a surfel. Where it is seen so long that it leaves the splat's reach, it has
         // to be as much wider to hold one within it.
         let reach = self.pass.shape.reach();
         let least = (a * c - b * b) / (a + c) * (reach * reach);
         let mut fills = zero;
         let pixels: &[_] = match self.pass.shape {
+            SplatShape::Ellipse => &[],
             SplatShape::Square1 => &[(0.5, 0.5, 1.0)],
             SplatShape::Square2 => {
                 &[(0.0, 0.0, 1.0), (1.0, 0.0, 2.0), (0.0, 1.0, 4.0), (1.0, 1.0, 8.0)]
@@ -509,6 +562,39 @@ impl Projection<'_> {
             fills = fills + R::select(far, zero.splat(bit), zero);
         }
         fills
+    }
+
+    /// Draws ellipses: every sample of the tile within one gets its key, deeper towards the rim, so that of the
+    /// overlapping disks of one surface the nearest middle wins.
+    fn splat_ellipses(&self, hits: &Hits, tile: &mut [u64]) {
+        let stride = self.stride as usize;
+        let inner = [self.patch.rect.width(), self.patch.rect.height()];
+        let [right, bottom] = inner.map(|n| (n * self.pass.samples + BORDER - 1) as f32);
+        let left = BORDER as f32;
+        for i in 0..hits.len {
+            let [x, y, a, b, c, wide, high, rise] = [0, 1, 2, 3, 4, 5, 6, 7].map(|k| hits.ellipse[k][i]);
+            let surfel = u64::from(hits.surfel[i]);
+            let depth = hits.depth[i];
+            // Centres of samples lie half a sample behind their index. Not negative: casts truncate, which is floor.
+            let range = |at: f32, reach: f32, end: f32| {
+                let (from, to) = ((at - reach - 0.5).ceil().max(left), (at + reach - 0.5).min(end));
+                if from <= to { from as usize..to as usize + 1 } else { 0..0 }
+            };
+            let columns = range(x, wide, right);
+            for row in range(y, high, bottom) {
+                let dy = row as f32 + 0.5 - y;
+                let (slope, rest) = (2.0 * b * dy, c * dy * dy);
+                let samples = &mut tile[row * stride + columns.start..row * stride + columns.end];
+                for (column, sample) in columns.clone().zip(samples) {
+                    let dx = column as f32 + 0.5 - x;
+                    let distance = dx * (a * dx + slope) + rest;
+                    if distance <= 1.0 {
+                        let key = u64::from((depth + rise * distance).to_bits()) << 32 | surfel;
+                        *sample = (*sample).min(key);
+                    }
+                }
+            }
+        }
     }
 
     /// Position in the tile, in pixels plus `offset`, and the homogeneous w.

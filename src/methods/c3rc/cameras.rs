@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::super::FrameInput;
 use super::footprint::Footprint;
-use super::guard::{self, Guard, Reach};
+use super::guard::{self, Guard, MAX_GUARD, Reach};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
 use crate::camera::RayScale;
@@ -26,6 +26,8 @@ const CONTACT: f64 = 1e-5;
 const SHORTENING: f64 = 1e3;
 /// Surfels are so evenly spread that a disk of this many of their radii about any point of a surface holds one.
 const EVENNESS: f64 = 1.5;
+/// No camera has more than so many times the detail that was asked for (untuned).
+const MOST_DETAIL: f64 = 64.0;
 /// For the rounding of a gaze's cosine.
 const GAZE_SLACK: f64 = 1e-5;
 
@@ -35,6 +37,7 @@ pub(super) struct CameraSettings {
     pub(super) ray_scale: RayScale,
     pub(super) shape: SplatShape,
     pub(super) samples: u32,
+    pub(super) detail: f64,
 }
 
 impl CameraSettings {
@@ -159,7 +162,13 @@ fn of_patch(
             let before = corners_px.iter().all(|c| c.z > 0.0);
             let seen_px = corners_px.map(|c| if before { c.truncate() / c.z } else { DVec2::NAN });
             let footprint = Footprint::new(&seen_px, &own);
-            let guard = guard.holding(radius, &footprint, range.map(f64::from));
+            let detail = own_detail(settings.detail, &corners_px, &footprint, range.map(f64::from));
+            // A representative's disk has the area of a share of a pixel.
+            let holds = |lambda: f64| {
+                let area = if detail > 0.0 { footprint.area_per_px(lambda) / detail } else { 0.0 };
+                radius.max(EVENNESS * (area / std::f64::consts::PI).sqrt())
+            };
+            let guard = guard.holding(holds, &footprint, range.map(f64::from));
             let own_grown = own.grown(guard);
             let several = mixed_sign_range(&own_grown, range[0].into(), range[1].into());
             let from_eye =
@@ -178,6 +187,8 @@ fn of_patch(
                     .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / (radius * samples)))),
                 gaze: gaze(&scene.objects[object], &own_grown),
                 representatives: scene.objects[object].representatives.start,
+                detail: detail as f32,
+                radius: radius as f32,
                 extent: scene.objects[object].extent,
                 footprint: footprint.quadratics().map(|q| q.map(|x| x as f32)),
                 guard: array(guard),
@@ -186,6 +197,25 @@ fn of_patch(
             });
         }
     }
+}
+
+/// The detail for one camera: more than `detail` where its triangle is so thin that a representative could cover all of
+/// its pixels from beyond the guard band.
+fn own_detail(detail: f64, corners: &[DVec3; 3], footprint: &Footprint, range: [f64; 2]) -> f64 {
+    let px = corners.map(|c| c.truncate() / c.z);
+    let edges = [px[1] - px[0], px[2] - px[1], px[0] - px[2]];
+    let longest = edges.iter().fold(0.0, |m: f64, e| m.max(e.length()));
+    let band = MAX_GUARD * edges[0].perp_dot(edges[1]).abs() / longest;
+    let [lo, hi] = range;
+    let reach = [lo, 0.5 * (lo + hi), hi]
+        .into_iter()
+        .map(|lambda| {
+            let radius = EVENNESS * (footprint.area_per_px(lambda) / std::f64::consts::PI).sqrt();
+            radius * footprint.px_per_unit(lambda)
+        })
+        .fold(0.0, f64::max);
+    let needed = (reach / band).powi(2);
+    if needed.is_finite() { detail.max(needed.min(detail * MOST_DETAIL)) } else { detail }
 }
 
 /// See [`CameraInstance::gaze`]. From inside an object its far side is seen from behind.

@@ -38,6 +38,12 @@ impl Footprint {
         [product(x0, x1, x0, x1), product(x0, x1, y0, y1), product(y0, y1, y0, y1)]
     }
 
+    /// Area across the axis that a pixel sees, at λ.
+    pub(super) fn area_per_px(&self, lambda: f64) -> f64 {
+        let map = self.base + self.per_lambda * lambda;
+        map.x_axis.reject_from(self.axis).cross(map.y_axis.reject_from(self.axis)).length()
+    }
+
     /// How many pixels a unit across the rays covers at most, at λ. Not a number or infinite where T(λ) has no area.
     pub(super) fn px_per_unit(&self, lambda: f64) -> f64 {
         let map = self.base + self.per_lambda * lambda;

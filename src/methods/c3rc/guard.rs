@@ -8,7 +8,7 @@ use crate::visibility::{Patch, Visibility};
 
 /// Furthest guard as a weight. Rays are not extrapolated further than this: a triangle much thinner than a
 /// pixel sees many surfels a pixel anyway (untuned).
-const MAX_GUARD: f64 = 0.5;
+pub(super) const MAX_GUARD: f64 = 0.5;
 /// Added for the rounding of weights to f32.
 const SLACK: f64 = 1e-3;
 
@@ -22,7 +22,7 @@ pub(super) struct Reach {
 }
 
 /// Shares of the splat's reach at which margins are computed; between them a chord is taken.
-const STEPS: [f64; 5] = [0.0, 0.125, 0.25, 0.5, 1.0];
+const STEPS: [f64; 7] = [0.0, 0.03, 0.0625, 0.125, 0.25, 0.5, 1.0];
 
 /// The margins of one patch, by how far surfels lie apart on the screen.
 pub(super) struct Guard {
@@ -42,13 +42,18 @@ impl Guard {
         Self { margins: margins(corners, visibility, patch, reach), reach }
     }
 
-    /// The margins for surfels of which a disk of this radius about any point of a surface holds one, seen at λ
+    /// The margins for surfels of which a disk of this radius (by λ) about any point of a surface holds one, seen at λ
     /// within `range`: nothing is needed from farther outside than one of them must lie from a pixel's centre.
-    pub(super) fn holding(&self, radius: f64, footprint: &Footprint, range: [f64; 2]) -> DVec3 {
+    pub(super) fn holding(
+        &self,
+        radius: impl Fn(f64) -> f64,
+        footprint: &Footprint,
+        range: [f64; 2],
+    ) -> DVec3 {
         let [lo, hi] = range;
         let share = [lo, 0.5 * (lo + hi), hi]
             .into_iter()
-            .map(|lambda| radius * footprint.px_per_unit(lambda) / self.reach.splat)
+            .map(|lambda| radius(lambda) * footprint.px_per_unit(lambda) / self.reach.splat)
             .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
         // The least weight over points that move apart is a concave function of how far they do: the chord is on
         // the safe side. Nothing is found for what is not a number.
@@ -220,7 +225,7 @@ mod tests {
         let origins = px.map(|p| (p * 0.01).extend(0.0));
         let rays = Rays { origins, directions: origins.map(|v| v + DVec3::Z) };
         let footprint = Footprint::new(&px, &rays);
-        let at = |radius: f64| guard.holding(radius, &footprint, [0.5, 1.0]);
+        let at = |radius: f64| guard.holding(|_| radius, &footprint, [0.5, 1.0]);
         assert_eq!(at(0.0), guard.margins[0]);
         let radii = [0.001, 0.003, 0.007, 0.012];
         for pair in radii.windows(2) {
@@ -229,6 +234,6 @@ mod tests {
         assert_eq!(at(1.0), guard.margins[STEPS.len() - 1]);
         assert_eq!(at(f64::INFINITY), guard.margins[STEPS.len() - 1]);
         let flat = Footprint::new(&[DVec2::ZERO; 3], &rays);
-        assert_eq!(guard.holding(0.001, &flat, [0.5, 1.0]), guard.margins[STEPS.len() - 1]);
+        assert_eq!(guard.holding(|_| 0.001, &flat, [0.5, 1.0]), guard.margins[STEPS.len() - 1]);
     }
 }

@@ -33,9 +33,9 @@ static INFO: MethodInfo = MethodInfo {
         },
         ParamInfo {
             id: "splat",
-            about: "pixels that a surfel covers: the one it falls on, or 2 x 2",
+            about: "samples that a surfel covers: those that its disk is seen on, the one it falls on, or 2 x 2",
             unit: "",
-            kind: ParamKind::Choice(&["square1", "square2"]),
+            kind: ParamKind::Choice(&["ellipse", "square1", "square2"]),
             default: Value::Choice("square2"),
             is_quality_knob: true,
         },
@@ -115,17 +115,18 @@ impl Method for C3rc {
         let scene = frame.scene;
         let shape = match params.choice("splat") {
             "square1" => SplatShape::Square1,
-            _ => SplatShape::Square2,
+            "square2" => SplatShape::Square2,
+            _ => SplatShape::Ellipse,
         };
         let samples = params.integer("samples");
+        let detail = params.integer("detail");
         let settings =
-            cameras::CameraSettings { ray_scale: ray_scale(params.choice("ray-scale")), shape, samples };
+            cameras::CameraSettings { ray_scale: ray_scale(params.choice("ray-scale")), shape, samples, detail: f64::from(detail) };
         let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
         let mut list = Vec::new();
         patches(frame.eye, frame.visibility, corners, &mut PatchScratch::default(), &mut list);
         let (cameras, patch_cameras) = cameras::cameras(frame, &list, settings);
         out.times.cameras_ms = milliseconds(start);
-        let detail = params.integer("detail") as f32;
         let test = match params.choice("test") {
             "none" => BoxTest::None,
             "interval" => BoxTest::Interval,
@@ -137,7 +138,7 @@ impl Method for C3rc {
             patches: list,
             cameras,
             patch_cameras,
-            batches: Box::new(Culler::new(scene, test, detail)),
+            batches: Box::new(Culler::new(scene, test)),
             shape,
             samples,
             depth: match params.choice("depth") {
