@@ -105,32 +105,9 @@ impl Walk<'_> {
             let small = if self.per_pixel > 0.0 { self.small(simd, node, &tested) } else { [0; 3] };
             // The last child first, so that leaves come out in surfel order.
             while bits != 0 {
-                let slot = 63 - bits.leading_zeros() as usize;
+                let slot = 63 - bits.leading_zeros();
                 bits ^= 1 << slot;
-                let inside = tested.inside >> slot & 1 != 0 && self.per_pixel == 0.0;
-                let of = |wide: u32, slot: u32| {
-                    self.representatives + wide * REPRESENTATIVES as u32 + slot
-                };
-                let lambda = [tested.lo[slot], tested.hi[slot]];
-                let (first, count) = (self.first + node.first[slot], node.count[slot]);
-                let child = node.child[slot];
-                let size = [0, 1, 2].into_iter().find(|k| small[*k] >> slot & 1 != 0);
-                stack[top] = match (size, child) {
-                    (Some(0), _) => {
-                        Open { child: 0, first: of(at, slot as u32), count: 1, stride: 1, lambda }
-                    }
-                    // Of a leaf every fourth or second surfel stands for its neighbours.
-                    (Some(1), 0) => Open { child: 0, first, count: count.div_ceil(4), stride: 4, lambda },
-                    (Some(2), 0) => Open { child: 0, first, count: count.div_ceil(2), stride: 2, lambda },
-                    (Some(1), _) => {
-                        Open { child: 0, first: of(child, QUADS), count: 2, stride: 1, lambda }
-                    }
-                    (Some(_), _) => {
-                        Open { child: 0, first: of(child, PAIRS), count: 4, stride: 1, lambda }
-                    }
-                    (None, _) if inside => Open { child: 0, first, count, stride: 1, lambda },
-                    (None, _) => Open { child, first, count, stride: 1, lambda },
-                };
+                stack[top] = self.open(node, at, slot, small, &tested);
                 top += 1;
             }
             loop {
@@ -168,6 +145,57 @@ impl Walk<'_> {
 }
 
 impl Walk<'_> {
+    /// What is left to do for a child of the wide node `at`: its surfels, its representative, that of a few of its
+    /// parts, or its own children.
+    #[inline(always)]
+    fn open(&self, node: &WideNode, at: u32, slot: u32, small: [u64; 3], tested: &Tested) -> Open {
+        let i = slot as usize;
+        let child = node.child[i];
+        let all = Open {
+            child,
+            first: self.first + node.first[i],
+            count: node.count[i],
+            stride: 1,
+            lambda: [tested.lo[i], tested.hi[i]],
+        };
+        let own = self.representatives + at * REPRESENTATIVES;
+        let parts = self.representatives + child * REPRESENTATIVES;
+        if small[0] >> slot & 1 != 0 {
+            Open { child: 0, first: own + slot, count: 1, ..all }
+        } else if small[1] >> slot & 1 != 0 {
+            match child {
+                // Of a leaf every fourth surfel, or every second, stands for its neighbours.
+                0 => Open { count: all.count.div_ceil(4), stride: 4, ..all },
+                _ => Open {
+                    child: 0,
+                    first: parts + QUADS,
+                    count: self.used(child).div_ceil(4),
+                    ..all
+                },
+            }
+        } else if small[2] >> slot & 1 != 0 {
+            match child {
+                0 => Open { count: all.count.div_ceil(2), stride: 2, ..all },
+                _ => Open {
+                    child: 0,
+                    first: parts + PAIRS,
+                    count: self.used(child).div_ceil(2),
+                    ..all
+                },
+            }
+        } else if tested.inside >> slot & 1 != 0 && self.per_pixel == 0.0 {
+            Open { child: 0, ..all }
+        } else {
+            all
+        }
+    }
+
+    /// Children of a wide node: they fill its first slots.
+    #[inline(always)]
+    fn used(&self, wide: u32) -> u32 {
+        self.wide[wide as usize].used.count_ones()
+    }
+
     /// Bit i: child i is seen as small enough for one, two, four representatives.
     #[inline(always)]
     fn small<S: Simd>(&self, simd: S, node: &WideNode, tested: &Tested) -> [u64; 3] {

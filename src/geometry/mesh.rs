@@ -185,10 +185,8 @@ impl Mesh {
         edges.sort_unstable();
         let pairs = edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
         let area = 2.0 * self.area();
-        volume > 0.0
-            && outward > MOSTLY * area
-            && edges.len().is_multiple_of(2)
-            && { pairs }.all(|pair| pair.len() == 2 && pair[0].2 + pair[1].2 == 0)
+        volume > 0.0 && outward > MOSTLY * area && edges.len().is_multiple_of(2) && { pairs }
+            .all(|pair| pair.len() == 2 && pair[0].2 + pair[1].2 == 0)
     }
 
     /// Fills in missing normals: the average of the adjacent triangles' normals, weighted by the angle

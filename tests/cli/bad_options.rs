@@ -57,7 +57,10 @@ fn options_of_methods() {
             "--preset: raytrace has no preset \"paper\"; leave it out",
         ),
         ("--test sphere", "--test: \"sphere\" is not a choice; use one of none, interval"),
-        ("--splat round", "--splat: \"round\" is not a choice; use one of square1, square2"),
+        (
+            "--splat round",
+            "--splat: \"round\" is not a choice; use one of ellipse, square1, square2",
+        ),
         ("--method raytrace --spp 0", "--spp: \"0\" is not a whole number from 1 to 65536"),
         ("--method raytrace --spp 1.5", "--spp: \"1.5\" is not a whole number"),
         ("--method raytrace --spp 4000000000", "--spp: \"4000000000\" is not a whole number"),

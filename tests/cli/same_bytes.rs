@@ -44,6 +44,11 @@ fn by_three_ray_cameras() {
 }
 
 #[test]
+fn with_level_of_detail() {
+    same("c3rc --splat ellipse --detail 4 --samples 2");
+}
+
+#[test]
 fn by_rays() {
     same("raytrace");
 }

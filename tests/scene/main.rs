@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails where it panics")]
 
+mod detail;
 mod light;
 mod moves;
 mod plane_mirror;

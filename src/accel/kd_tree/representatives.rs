@@ -5,15 +5,16 @@
 
 use glam::{DVec3, Vec3};
 
-use super::wide::{CHILDREN, WideNode};
+use super::wide::{CHILDREN, WIDTH, WideNode};
 use crate::geometry::Surfels;
 
 /// Representatives a wide node.
-pub const REPRESENTATIVES: usize = CHILDREN + CHILDREN / 2 + CHILDREN / 4;
+pub const REPRESENTATIVES: u32 = WIDTH + WIDTH / 2 + WIDTH / 4;
 /// Offset of those for two neighbours.
-pub const PAIRS: u32 = CHILDREN as u32;
+pub const PAIRS: u32 = WIDTH;
 /// Offset of those for four.
-pub const QUADS: u32 = PAIRS + CHILDREN as u32 / 2;
+pub const QUADS: u32 = PAIRS + WIDTH / 2;
+const EACH: usize = REPRESENTATIVES as usize;
 
 /// Sums over the surfels of a node.
 #[derive(Clone, Copy, Default)]
@@ -56,7 +57,7 @@ fn members(slot: usize) -> std::ops::Range<usize> {
 #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
 pub(super) fn append(wide: &mut [WideNode], surfels: &mut Surfels) {
     let n = surfels.len();
-    let total = n + wide.len() * REPRESENTATIVES;
+    let total = n + wide.len() * EACH;
     for list in [&mut surfels.x, &mut surfels.y, &mut surfels.z] {
         list.truncate(n);
         list.resize(total, 0.0);
@@ -83,7 +84,7 @@ pub(super) fn append(wide: &mut [WideNode], surfels: &mut Surfels) {
             extent[slot] = surfels.extent[first];
             sums[w].add(own[slot]);
         }
-        for slot in 0..REPRESENTATIVES {
+        for slot in 0..EACH {
             let mut all = Moments::default();
             let mut leaf_extent = 0.0f32;
             for child in members(slot) {
@@ -97,7 +98,7 @@ pub(super) fn append(wide: &mut [WideNode], surfels: &mut Surfels) {
             // A disk's mean squared distance from its middle is half its squared radius.
             let variance = (all.squares / all.count - middle.length_squared()).max(0.0);
             let radius = (2.0 * variance + f64::from(leaf_extent).powi(2)).sqrt() as f32;
-            let at = n + w * REPRESENTATIVES + slot;
+            let at = n + w * EACH + slot;
             [surfels.x[at], surfels.y[at], surfels.z[at]] = middle.as_vec3().to_array();
             surfels.normals[at] = all.normal.try_normalize().map_or(Vec3::Y, |n| n.as_vec3());
             surfels.extent[at] = radius;
@@ -124,12 +125,11 @@ pub(super) fn average(wide: &[WideNode], values: &mut [Vec3], first: usize, from
             };
             sums[w] = (sums[w].0 + own[slot].0, sums[w].1 + own[slot].1);
         }
-        for slot in 0..REPRESENTATIVES {
-            let (sum, count) = own[members(slot)]
-                .iter()
-                .fold((DVec3::ZERO, 0.0), |(s, n), o| (s + o.0, n + o.1));
+        for slot in 0..EACH {
+            let (sum, count) =
+                own[members(slot)].iter().fold((DVec3::ZERO, 0.0), |(s, n), o| (s + o.0, n + o.1));
             if count > 0.0 {
-                values[from + w * REPRESENTATIVES + slot] = (sum / count).as_vec3();
+                values[from + w * EACH + slot] = (sum / count).as_vec3();
             }
         }
     }

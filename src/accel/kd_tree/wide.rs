@@ -7,7 +7,7 @@ use crate::geometry::Aabb;
 
 /// Children of a wide node.
 pub const CHILDREN: usize = 8;
-const WIDTH: u32 = 8;
+pub(super) const WIDTH: u32 = 8;
 /// For the rounding of a cone's cosine.
 const CONE_SLACK: f32 = 1e-5;
 

@@ -106,7 +106,9 @@ struct Packed {
 
 impl Packed {
     fn clear(&mut self) {
-        for list in [&mut self.x, &mut self.y, &mut self.z, &mut self.size, &mut self.lo, &mut self.hi] {
+        for list in
+            [&mut self.x, &mut self.y, &mut self.z, &mut self.size, &mut self.lo, &mut self.hi]
+        {
             list.clear();
         }
         self.surfel.clear();
@@ -151,7 +153,9 @@ impl Packed {
 
     /// Makes vector loads beyond the end possible.
     fn pad(&mut self) {
-        for list in [&mut self.x, &mut self.y, &mut self.z, &mut self.size, &mut self.lo, &mut self.hi] {
+        for list in
+            [&mut self.x, &mut self.y, &mut self.z, &mut self.size, &mut self.lo, &mut self.hi]
+        {
             list.resize(list.len() + PADDING, 0.0);
         }
         self.surfel.resize(self.surfel.len() + PADDING, 0);
@@ -375,7 +379,8 @@ fn fill_tile(tile: &mut Vec<u64>, patch: &Patch, visibility: &Visibility, sample
     for y in patch.rect.min[1]..patch.rect.max[1] {
         let from = (y * visibility.size.width + patch.rect.min[0]) as usize;
         let ids = &visibility.mirror_ids[from..from + patch.rect.width() as usize];
-        let at = ((y - patch.rect.min[1]) as usize * side + BORDER as usize) * stride + BORDER as usize;
+        let at =
+            ((y - patch.rect.min[1]) as usize * side + BORDER as usize) * stride + BORDER as usize;
         for (i, (x, &id)) in (patch.rect.min[0]..).zip(ids).enumerate() {
             debug_assert!(id != NONE_ID || patch.triangle.0 != NONE_ID);
             if id == patch.triangle.0 && patch.cell.is_none_or(|c| c.contains(x, y)) {
@@ -461,61 +466,57 @@ impl Projection<'_> {
             let lo = V::load(simd, &packed.lo[i..]);
             let hi = V::load(simd, &packed.hi[i..]);
             let size = V::load(simd, &packed.size[i..]);
-                let mut seen = 0u64;
-                let mut taken = !active;
-                for image in project(&self.camera.camera, q, lo, hi).as_slice() {
-                    let front = zero.lt(image.linear(self.camera.front)) & active;
-                    let inside = image.within([EDGE_TOLERANCE; 3]) & front;
-                    seen |= V::bits(inside);
-                    let mut drawn = image.within(self.camera.guard) & front;
-                    if self.pass.first_root_only {
-                        drawn = drawn & !taken;
-                        taken = taken | drawn;
-                    }
-                    if !V::any(drawn) {
+            let mut seen = 0u64;
+            let mut taken = !active;
+            for image in project(&self.camera.camera, q, lo, hi).as_slice() {
+                let front = zero.lt(image.linear(self.camera.front)) & active;
+                let inside = image.within([EDGE_TOLERANCE; 3]) & front;
+                seen |= V::bits(inside);
+                let mut drawn = image.within(self.camera.guard) & front;
+                if self.pass.first_root_only {
+                    drawn = drawn & !taken;
+                    taken = taken | drawn;
+                }
+                if !V::any(drawn) {
+                    continue;
+                }
+                let [x, y, lands] = self.place(image, offset);
+                let d = self.direction(image);
+                let depth = self.depth(image, d);
+                let form = self.form(image, d, size);
+                let before = zero.lt(lands);
+                let lands;
+                if self.pass.shape == SplatShape::Ellipse {
+                    let (form, [wide, high]) = capped(form);
+                    lands = drawn
+                        & before
+                        & zero.le(x + wide)
+                        & (x - wide).lt(width)
+                        & zero.le(y + high)
+                        & (y - high).lt(height);
+                    if !V::any(lands) {
                         continue;
                     }
-                    let [x, y, lands] = self.place(image, offset);
-                    let d = self.direction(image);
-                    let depth = self.depth(image, d);
-                    let form = self.form(image, d, size);
-                    let before = zero.lt(lands);
-                    let lands;
-                    if self.pass.shape == SplatShape::Ellipse {
-                        let (form, [wide, high]) = capped(form);
-                        lands = drawn
-                            & before
-                            & zero.le(x + wide)
-                            & (x - wide).lt(width)
-                            & zero.le(y + high)
-                            & (y - high).lt(height);
-                        if !V::any(lands) {
-                            continue;
-                        }
-                        let rise = (one / size).sqrt() * (self.camera.radius * self.camera.scale * RISE);
-                        let values = [x, y, form[0], form[1], form[2], wide, high, rise];
-                        for k in 0..values.len() {
-                            values[k].compress(lands, &mut hits.ellipse[k][len..]);
-                        }
-                    } else {
-                        lands = drawn
-                            & before
-                            & zero.le(x)
-                            & x.lt(width)
-                            & zero.le(y)
-                            & y.lt(height);
-                        if !V::any(lands) {
-                            continue;
-                        }
-                        let cell = [x.floor(), y.floor()];
-                        let fills = self.fills(form, [cell[0] - x, cell[1] - y]);
-                        V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
+                    let rise =
+                        (one / size).sqrt() * (self.camera.radius * self.camera.scale * RISE);
+                    let values = [x, y, form[0], form[1], form[2], wide, high, rise];
+                    for (value, list) in values.into_iter().zip(&mut hits.ellipse) {
+                        value.compress(lands, &mut list[len..]);
                     }
-                    depth.compress(lands, &mut hits.depth[len..]);
-                    V::compress_numbers(simd, &packed.surfel[i..], lands, &mut hits.surfel[len..]);
-                    len += V::bits(lands).count_ones() as usize;
+                } else {
+                    lands = drawn & before & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
+                    if !V::any(lands) {
+                        continue;
+                    }
+                    let cell = [x.floor(), y.floor()];
+                    let fills = self.fills(form, [cell[0] - x, cell[1] - y]);
+                    V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
                 }
-                valid += u64::from(seen.count_ones());
+                depth.compress(lands, &mut hits.depth[len..]);
+                V::compress_numbers(simd, &packed.surfel[i..], lands, &mut hits.surfel[len..]);
+                len += V::bits(lands).count_ones() as usize;
+            }
+            valid += u64::from(seen.count_ones());
             i += lanes;
         }
         hits.len = len;
@@ -572,10 +573,16 @@ impl Projection<'_> {
         let [right, bottom] = inner.map(|n| (n * self.pass.samples + BORDER - 1) as f32);
         let left = BORDER as f32;
         for i in 0..hits.len {
-            let [x, y, a, b, c, wide, high, rise] = [0, 1, 2, 3, 4, 5, 6, 7].map(|k| hits.ellipse[k][i]);
+            let [x, y, a, b, c, wide, high, rise] =
+                [0, 1, 2, 3, 4, 5, 6, 7].map(|k| hits.ellipse[k][i]);
             let surfel = u64::from(hits.surfel[i]);
             let depth = hits.depth[i];
             // Centres of samples lie half a sample behind their index. Not negative: casts truncate, which is floor.
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "see above"
+            )]
             let range = |at: f32, reach: f32, end: f32| {
                 let (from, to) = ((at - reach - 0.5).ceil().max(left), (at + reach - 0.5).min(end));
                 if from <= to { from as usize..to as usize + 1 } else { 0..0 }

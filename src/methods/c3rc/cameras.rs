@@ -230,11 +230,7 @@ fn gaze(object: &PreparedObject, rays: &Rays) -> Option<Gaze> {
     let cosines = rays.directions.iter().map(|d| d.normalize_or_zero().dot(axis));
     let cosine = cosines.fold(1.0, f64::min) - GAZE_SLACK;
     let sine = (1.0 - cosine * cosine).sqrt();
-    (cosine > 0.0).then_some(Gaze {
-        axis: array(axis),
-        cosine: cosine as f32,
-        sine: sine as f32,
-    })
+    (cosine > 0.0).then_some(Gaze { axis: array(axis), cosine: cosine as f32, sine: sine as f32 })
 }
 
 fn rays_in(to_scene: &Similarity, rays: &Rays) -> Rays {

@@ -120,8 +120,12 @@ impl Method for C3rc {
         };
         let samples = params.integer("samples");
         let detail = params.integer("detail");
-        let settings =
-            cameras::CameraSettings { ray_scale: ray_scale(params.choice("ray-scale")), shape, samples, detail: f64::from(detail) };
+        let settings = cameras::CameraSettings {
+            ray_scale: ray_scale(params.choice("ray-scale")),
+            shape,
+            samples,
+            detail: f64::from(detail),
+        };
         let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
         let mut list = Vec::new();
         patches(frame.eye, frame.visibility, corners, &mut PatchScratch::default(), &mut list);
