@@ -449,9 +449,15 @@ impl Projection<'_> {
             SplatShape::Square2 => BORDER as f32 - 0.5,
         };
         let (zero, one) = (V::broadcast(simd, 0.0), V::broadcast(simd, 1.0));
-        let width = V::broadcast(simd, (self.stride - BORDER) as f32);
+        // An ellipse may reach the tile from outside.
+        let beyond = match self.pass.shape {
+            SplatShape::Ellipse => LARGEST_ELLIPSE,
+            _ => 0.0,
+        };
+        let before = V::broadcast(simd, -beyond);
+        let width = V::broadcast(simd, (self.stride - BORDER) as f32 + beyond);
         let rows = self.patch.rect.height() * self.pass.samples;
-        let height = V::broadcast(simd, (rows + BORDER) as f32);
+        let height = V::broadcast(simd, (rows + BORDER) as f32 + beyond);
         let mut len = 0;
         let mut i = 0;
         while i < count {
@@ -480,16 +486,18 @@ impl Projection<'_> {
                 if !V::any(drawn) {
                     continue;
                 }
-                let [x, y, lands] = self.place(image, offset);
+                let [x, y, w] = self.place(image, offset);
+                let mut lands =
+                    drawn & zero.lt(w) & before.le(x) & x.lt(width) & before.le(y) & y.lt(height);
+                if !V::any(lands) {
+                    continue;
+                }
                 let d = self.direction(image);
                 let depth = self.depth(image, d);
                 let form = self.form(image, d, size);
-                let before = zero.lt(lands);
-                let lands;
                 if self.pass.shape == SplatShape::Ellipse {
                     let (form, [wide, high]) = capped(form);
-                    lands = drawn
-                        & before
+                    lands = lands
                         & zero.le(x + wide)
                         & (x - wide).lt(width)
                         & zero.le(y + high)
@@ -504,10 +512,6 @@ impl Projection<'_> {
                         value.compress(lands, &mut list[len..]);
                     }
                 } else {
-                    lands = drawn & before & zero.le(x) & x.lt(width) & zero.le(y) & y.lt(height);
-                    if !V::any(lands) {
-                        continue;
-                    }
                     let cell = [x.floor(), y.floor()];
                     let fills = self.fills(form, [cell[0] - x, cell[1] - y]);
                     V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
