@@ -18,7 +18,7 @@ pub enum Error {
         remedy: String,
     },
     /// An output could not be written.
-    #[error("{name}: cannot be written: {problem}; choose another place or free some space")]
+    #[error("{name}: cannot be written: {problem}; {remedy}", remedy = remedy(.problem))]
     Output {
         /// The file to be written.
         name: String,
@@ -57,6 +57,14 @@ impl Error {
         remedy: impl Into<String>,
     ) -> Self {
         Self::input(path.display().to_string(), place, problem, remedy)
+    }
+}
+
+fn remedy(problem: &str) -> &'static str {
+    if problem.contains("folder does not exist") {
+        "create the folder, or choose another place"
+    } else {
+        "choose another place or free some space"
     }
 }
 

@@ -20,7 +20,10 @@ use commands::{SceneArgs, say, with_method_flags};
 ///
 /// Without a command: the built-in scene, as a picture.
 #[derive(Parser, Debug)]
-#[command(version)]
+#[command(
+    version,
+    after_help = "Try `catoptric render room`, or `catoptric render MODEL.obj` with a model of yours."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Verb>,

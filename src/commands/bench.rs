@@ -53,6 +53,10 @@ pub(crate) fn layer(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> any
     check_json(args.json.as_ref())?;
     let (method, params, leaf) =
         chosen_method(&args.how.method, args.how.preset.as_deref(), matches)?;
+    if method.info().id == "raytrace" {
+        let problem = "raytrace is what the layer is compared with";
+        return Err(Error::input("--method", "", problem, "choose another method").into());
+    }
     let rays = catoptric::methods::method("raytrace").expect("it is in the registry");
     let mut rays_params = Params::defaults(rays.info().params);
     // The layer has no mirror occluders yet, so the rays need not look for them either.

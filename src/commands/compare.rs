@@ -165,9 +165,12 @@ fn report(found: &Comparison, place: &Where, names: &[String]) -> String {
         None => lines.push("objects   not compared: needs the AOV files of both".into()),
         Some(objects) => {
             lines.push(format!("objects   {}", shares(objects.total)));
-            let by_id = objects.by_id.iter();
-            lines.extend(by_id.map(|(&id, &count)| {
-                format!("          {}: {}", name_of(id, names), shares(count))
+            // The worst ones; all are in the JSON.
+            let mut by_id: Vec<_> = objects.by_id.iter().collect();
+            by_id.sort_by_key(|(id, count)| (std::cmp::Reverse(count.missing + count.extra), **id));
+            let faulty = by_id.iter().filter(|(_, count)| count.missing + count.extra > 0);
+            lines.extend(faulty.take(WORST).map(|(id, count)| {
+                format!("          {}: {}", name_of(**id, names), shares(**count))
             }));
             lines.push(match objects.position {
                 None => "position  no pixel shows the same object".into(),
@@ -179,6 +182,9 @@ fn report(found: &Comparison, place: &Where, names: &[String]) -> String {
     }
     lines.join("\n")
 }
+
+/// Objects listed at most.
+const WORST: usize = 5;
 
 fn pixels_per_degree() -> f32 {
     catoptric::image::flip::PIXELS_PER_DEGREE

@@ -146,7 +146,7 @@ impl SceneArgs {
         memory::check(self.surfels, self.size)?;
         if let Err(name) = requested_level() {
             let problem = format!("{name:?} is not an instruction set");
-            let remedy = "unset it, or choose sse2, sse4.2 or avx2";
+            let remedy = "unset it, or choose sse2, sse4.2, avx2 or avx512";
             return Err(Error::input(SIMD_VARIABLE, "", problem, remedy).into());
         }
         self.start_threads()?;

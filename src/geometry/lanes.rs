@@ -408,7 +408,7 @@ impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
     }
 }
 
-/// Environment variable that lowers the instruction set: `sse2`, `sse4.2` or `avx2`.
+/// Environment variable that lowers the instruction set: `sse2`, `sse4.2`, `avx2` or `avx512`.
 pub const SIMD_VARIABLE: &str = "CATOPTRIC_SIMD";
 
 /// The best instruction set of this machine, or the lower one that [`SIMD_VARIABLE`] names, if there is that.
@@ -418,14 +418,15 @@ pub const SIMD_VARIABLE: &str = "CATOPTRIC_SIMD";
 pub fn requested_level() -> Result<Level, String> {
     let best = Level::new();
     let Ok(name) = std::env::var(SIMD_VARIABLE) else { return Ok(best) };
-    if !["sse2", "sse4.2", "avx2"].contains(&name.as_str()) {
+    if !["sse2", "sse4.2", "avx2", "avx512"].contains(&name.as_str()) {
         return Err(name);
     }
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     let lower = match name.as_str() {
         "sse2" => best.as_sse2().map(Level::Sse2),
         "sse4.2" => best.as_sse4_2().map(Level::Sse4_2),
-        _ => best.as_avx2().map(Level::Avx2),
+        "avx2" => best.as_avx2().map(Level::Avx2),
+        _ => None,
     };
     #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
     let lower = None;

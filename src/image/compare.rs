@@ -180,8 +180,8 @@ fn members(reference: Side<'_>, set: &Set) -> Result<Vec<bool>> {
         Error::input(
             "reference",
             "",
-            "has no planes that tell mirrors and objects",
-            "give its AOV file, or compare all pixels",
+            "is a mere picture, which does not tell mirrors and objects",
+            "give its AOV file (`render --aov FILE`) with --aov-b, or compare --where all",
         )
     })?;
     let around = |i: usize| neighbourhood(i, width as usize, height as usize);

@@ -197,9 +197,19 @@ fn beside_teapot(models: &[String], library: &mut Library) -> Result<Scene> {
     scene.eye = stepped_back(scene.eye, &boxes);
 
     let far = discs.iter().map(|d| d.center.length() + d.radius).fold(0.0, f64::max);
-    let ground = ground(far, library)?;
+    let ground = ground(GROUND_SHARE * far, library)?;
     scene.objects.push(Object { name: new_name(&scene, "ground"), ..ground });
     Ok(scene)
+}
+
+/// The ground reaches so much farther than what stands on it.
+const GROUND_SHARE: f64 = 2.0;
+/// Length of two of its tiles, world units.
+const GROUND_PERIOD: f64 = 0.5;
+
+#[expect(clippy::cast_possible_truncation, reason = "a length in a pattern")]
+fn narrow(x: f64) -> f32 {
+    x as f32
 }
 
 /// The checkered ground, grown if it would end less than `radius` from the origin.
@@ -208,7 +218,8 @@ fn ground(radius: f64, library: &mut Library) -> Result<Object> {
     let half = f64::from(mesh.bounds().extent().x.min(mesh.bounds().extent().z)) * 0.5;
     let transform = Similarity { scale: (radius / half).max(1.0), ..Similarity::IDENTITY };
     let colors = [Vec3::splat(0.72), Vec3::new(0.16, 0.17, 0.20)];
-    let paint = Paint::Pattern { kind: PatternKind::Checker, colors, period: 0.5 };
+    let period = narrow(GROUND_PERIOD / transform.scale);
+    let paint = Paint::Pattern { kind: PatternKind::Checker, colors, period };
     Ok(Object { name: String::new(), mesh, transform, paint, density: 1.0 })
 }
 

@@ -293,7 +293,14 @@ impl Source<'_> {
             (None, Some(_)) if thing.triangles.is_some() => {
                 Err(self.error(at, "triangles cannot be chosen for a file", "remove that key"))
             }
-            (None, Some(file)) => library.file(&self.folder.join(file)),
+            (None, Some(file)) => {
+                let path = self.folder.join(file);
+                if !path.exists() {
+                    let problem = format!("{} does not exist", path.display());
+                    return Err(self.error(at, &problem, "check the name and the folder"));
+                }
+                library.file(&path)
+            }
             (Some(_), Some(_)) => Err(self.error(at, "has both shape and file", "remove one")),
             (None, None) => Err(self.error(at, "has neither shape nor file", "add one of them")),
         }

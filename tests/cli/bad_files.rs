@@ -185,7 +185,7 @@ fn bad_scenes() {
         (with("translate", "translates"), "line 8: unknown field `translates`, expected one of"),
         (with("[[object]]", "[[objects]]"), "line 6: unknown field `objects`"),
         (with("cube", "cub"), "there is no built-in shape \"cub\"; the shapes are teapot"),
-        (with(cube, "file = \"none.ply\""), "none.ply: does not exist"),
+        (with(cube, "file = \"none.ply\""), "none.ply does not exist"),
         (with(cube, "file = \"nan.ply\""), "nan.ply: vertex 1: is not a finite number"),
         (with("3]", "nan]"), "line 2: "),
         (with("3]", "-inf]"), "line 2: "),

@@ -99,7 +99,7 @@ fn places_that_cannot_be_written() {
     for (options, expected) in [
         (
             "-o none/a.png",
-            "none/a.png: cannot be written: its folder does not exist; choose another",
+            "none/a.png: cannot be written: its folder does not exist; create the folder",
         ),
         ("-o file/a.png", "file/a.png: cannot be written: "),
         ("-o folder.png", "folder.png: cannot be written: it names a folder; "),
@@ -168,6 +168,13 @@ fn an_unknown_instruction_set() {
     let mut command = folder.command(["info", "knot"]);
     command.env("CATOPTRIC_SIMD", "avx3");
     let run = folder.finish(command);
-    let expected = "error: CATOPTRIC_SIMD: \"avx3\" is not an instruction set; unset it, or choose sse2, sse4.2 or avx2\n";
+    let expected = "error: CATOPTRIC_SIMD: \"avx3\" is not an instruction set; unset it, or choose sse2, sse4.2, avx2 or avx512\n";
     assert_eq!((run.code, run.err.as_str()), (Some(2), expected));
+}
+
+#[test]
+fn the_layer_of_rays_against_rays() {
+    let folder = Folder::new();
+    let expected = "--method: raytrace is what the layer is compared with; choose another method";
+    folder.refused(&format!("bench layer {SMALL} --method raytrace"), &[expected]);
 }

@@ -355,3 +355,13 @@ fn several_rays_a_pixel_come_nearer_to_many() {
     let (one, four) = (error(1), error(4));
     assert!(four < 0.7 * one, "{four} is not much less than {one}");
 }
+
+#[test]
+fn the_scene_of_the_readme_runs() {
+    let folder = Folder::new();
+    let readme = include_str!("../../README.md");
+    let scene = readme.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    std::fs::write(folder.path("readme.toml"), scene).unwrap();
+    let run = folder.good("render readme.toml --size 160x90 --surfels 20000");
+    assert!(run.out.contains("pot and knot"), "{}", run.out);
+}

@@ -27,7 +27,7 @@ static INFO: MethodInfo = MethodInfo {
         ParamInfo {
             id: "spp",
             about: "samples a pixel; 1 is the pixel's centre",
-            unit: "samples",
+            unit: "",
             kind: ParamKind::Integer(1, 65_536),
             default: Value::Integer(1),
             is_quality_knob: true,

@@ -166,7 +166,7 @@ fn files_are_relative_shared_and_named() {
         &Context::default(),
     );
     let error = error.unwrap_err().to_string();
-    assert!(error.contains("none.ply: does not exist"), "{error}");
+    assert!(error.contains("line ") && error.contains("none.ply does not exist"), "{error}");
     for (name, bytes, wanted) in [
         ("no.toml", None, "does not exist"),
         ("a.toml", Some(&b""[..]), "is empty"),
