@@ -81,8 +81,9 @@
 //!
 //! - **Eye**: the viewer's pinhole. **Camera**: a continuous 3-ray camera (C3RC): a triangle of a mirror with
 //!   the reflected view ray at each corner; rays in between are interpolated.
-//! - **Surfel**: a point sample of a surface, with normal, colour and extent. **Samples**, per pixel, are those
-//!   of the direct view and of the ray tracer (`spp`).
+//! - **Surfel**: a point sample of a surface, with normal, colour and extent. **Representative**: a surfel that stands
+//!   for all of a tree node, their mean. **Samples**, per pixel, are those of the direct view, of the ray tracer (`spp`)
+//!   and of splatting (`samples`).
 //! - **Patch**: a visible mirror triangle, or a cell of a large one. **Batch**: a contiguous range of surfels
 //!   that a camera has to project. **Image**: a place where a camera sees a surfel; there may be three.
 //! - **Layer**: the reflection before environment and direct view, and what it costs: patches, cameras,

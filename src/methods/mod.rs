@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 pub use params::{ParamInfo, ParamKind, Params, Value};
 
-use crate::camera::Eye;
+use crate::camera::{Eye, RayScale};
 use crate::context::Context;
 use crate::error::Result;
 use crate::plan::Plan;
@@ -29,6 +29,21 @@ pub struct MethodInfo {
     pub params: &'static [ParamInfo],
     /// Named sets of values.
     pub presets: &'static [Preset],
+}
+
+/// The parameter of all methods that use the camera's rays.
+const RAY_SCALE: ParamInfo = ParamInfo {
+    id: "ray-scale",
+    about: "length of a camera's three rays (unit: as in the paper)",
+    unit: "",
+    kind: ParamKind::Choice(&["eye-distance", "unit"]),
+    default: Value::Choice("eye-distance"),
+    is_quality_knob: false,
+};
+
+/// What a word of [`RAY_SCALE`] means.
+fn ray_scale(word: &str) -> RayScale {
+    if word == "unit" { RayScale::Unit } else { RayScale::EyeDistance }
 }
 
 /// A named set of parameter values.

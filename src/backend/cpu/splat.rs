@@ -2,20 +2,24 @@
 //! key of 0 marks samples of others, so that one comparison decides ownership and depth. The task ends with its
 //! pixels' colours, so that no picture of keys is ever written.
 
+mod hits;
+mod packed;
+mod projection;
+
 use std::time::Instant;
 
+use fearless_simd::{Level, dispatch, f32x16};
 use glam::Vec3;
-
-use fearless_simd::{Level, Simd, dispatch, f32x16};
 use rayon::prelude::*;
 
+use self::hits::Hits;
+use self::packed::Packed;
+pub(crate) use self::projection::Projection;
 use super::pool::Pool;
-use crate::camera::three_ray::project::along;
-use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
-use crate::geometry::lanes::{Pair, Real, Vector, dot, simd_level};
+use crate::geometry::lanes::{Pair, simd_level};
 use crate::geometry::surfel::PADDING;
-use crate::plan::{Batch, CameraInstance, DepthKey, LARGEST_ELLIPSE, SplatPass, SplatShape};
+use crate::plan::{Batch, SplatPass};
 use crate::visibility::{NONE_ID, Patch, Visibility};
 
 /// Nothing landed here.
@@ -89,106 +93,6 @@ pub(crate) struct Scratch {
     packed: Packed,
     hits: Hits,
     tile: Vec<u64>,
-}
-
-/// Surfels to be projected, side by side, whatever batches they come from.
-#[derive(Default)]
-struct Packed {
-    x: Vec<f32>,
-    y: Vec<f32>,
-    z: Vec<f32>,
-    /// Squared share of the surfel's radius in that of the object's surfels, inverse.
-    size: Vec<f32>,
-    lo: Vec<f32>,
-    hi: Vec<f32>,
-    surfel: Vec<u32>,
-}
-
-impl Packed {
-    fn clear(&mut self) {
-        for list in
-            [&mut self.x, &mut self.y, &mut self.z, &mut self.size, &mut self.lo, &mut self.hi]
-        {
-            list.clear();
-        }
-        self.surfel.clear();
-    }
-
-    fn len(&self) -> usize {
-        self.surfel.len()
-    }
-
-    /// Adds as much of `batch` as there is room for, from its surfel `from` on; returns how much.
-    fn add(&mut self, surfels: &Surfels, camera: &CameraInstance, batch: &Batch, from: u32) -> u32 {
-        let room = u32::try_from(CHUNK - self.len()).unwrap_or(0);
-        let count = (batch.count - from).min(room);
-        let first = batch.first + from * batch.stride;
-        let end = self.len() + count as usize;
-        if batch.stride == 1 {
-            let range = first as usize..(first + count) as usize;
-            self.x.extend_from_slice(&surfels.x[range.clone()]);
-            self.y.extend_from_slice(&surfels.y[range.clone()]);
-            self.z.extend_from_slice(&surfels.z[range.clone()]);
-            self.surfel.extend(first..first + count);
-            if first >= camera.representatives && camera.extent.is_finite() {
-                for extent in &surfels.extent[range] {
-                    let share = camera.extent / extent;
-                    self.size.push(share * share);
-                }
-            }
-        } else {
-            for surfel in (first..).step_by(batch.stride as usize).take(count as usize) {
-                let i = surfel as usize;
-                self.x.push(surfels.x[i]);
-                self.y.push(surfels.y[i]);
-                self.z.push(surfels.z[i]);
-                self.surfel.push(surfel);
-            }
-        }
-        self.size.resize(end, 1.0 / batch.stride as f32);
-        self.lo.resize(end, batch.lambda[0]);
-        self.hi.resize(end, batch.lambda[1]);
-        count
-    }
-
-    /// Makes vector loads beyond the end possible.
-    fn pad(&mut self) {
-        for list in
-            [&mut self.x, &mut self.y, &mut self.z, &mut self.size, &mut self.lo, &mut self.hi]
-        {
-            list.resize(list.len() + PADDING, 0.0);
-        }
-        self.surfel.resize(self.surfel.len() + PADDING, 0);
-    }
-}
-
-/// Drawn images.
-#[derive(Default)]
-struct Hits {
-    /// 16 · the tile slot of the splat's first pixel + for each of its 2 × 2 pixels a bit that says whether it
-    /// only [`FILLS`] that.
-    cell: Vec<u32>,
-    depth: Vec<f32>,
-    surfel: Vec<u32>,
-    len: usize,
-    /// Of ellipses instead of `cell`: the middle, the form a x² + 2 b x y + c y² that is 1 at the rim, half the
-    /// width and height, what the depth grows by towards the rim.
-    ellipse: [Vec<f32>; 8],
-}
-
-impl Hits {
-    /// Empties it and makes room.
-    fn clear(&mut self, room: usize) {
-        self.len = 0;
-        if self.cell.len() < room {
-            self.cell.resize(room, 0);
-            self.depth.resize(room, 0.0);
-            self.surfel.resize(room, 0);
-            for list in &mut self.ellipse {
-                list.resize(room, 0.0);
-            }
-        }
-    }
 }
 
 /// Runs the pass. Every pixel of a mirror belongs to one patch, so no pixel is in the lists twice.
@@ -356,10 +260,7 @@ impl Shared<'_> {
             hits.clear(MAX_IMAGES * count + PADDING);
             let valid = dispatch!(self.level, simd => self.work.run::<_, Pair<f32x16<_>>>(simd, packed, count, hits));
             let projected = Instant::now();
-            match self.work.pass.shape {
-                SplatShape::Ellipse => self.work.splat_ellipses(hits, tile),
-                shape => splat_hits(hits, shape, self.work.stride as usize, tile),
-            }
+            hits.draw(self.work.pass.shape, self.work.stride as usize, tile);
             let done = Instant::now();
             counters.projections += count as u64;
             counters.valid += valid;
@@ -390,255 +291,5 @@ fn fill_tile(tile: &mut Vec<u64>, patch: &Patch, visibility: &Visibility, sample
                 }
             }
         }
-    }
-}
-
-fn splat_hits(hits: &Hits, shape: SplatShape, stride: usize, tile: &mut [u64]) {
-    let n = hits.len;
-    let hits = hits.cell[..n].iter().zip(&hits.depth[..n]).zip(&hits.surfel[..n]);
-    for ((&cell, &depth), &surfel) in hits {
-        let key = u64::from(depth.to_bits()) << 32 | u64::from(surfel);
-        let slot = (cell >> 4) as usize;
-        let fills = u64::from(cell) << 60;
-        match shape {
-            SplatShape::Ellipse => unreachable!("drawn by splat_ellipses"),
-            SplatShape::Square1 => tile[slot] = tile[slot].min(key | (fills << 3 & FILLS)),
-            SplatShape::Square2 => {
-                let block = &mut tile[slot..slot + stride + 2];
-                for (corner, i) in [0, 1, stride, stride + 1].into_iter().enumerate() {
-                    block[i] = block[i].min(key | (fills << (3 - corner) & FILLS));
-                }
-            }
-        }
-    }
-}
-
-/// An ellipse's form (see [`Projection::form`]) that ends at [`LARGEST_ELLIPSE`], and half its width and height.
-#[inline(always)]
-fn capped<R: Real<Scalar = f32>>([a, b, c]: [R; 3]) -> ([R; 3], [R; 2]) {
-    let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
-    let (a, c) = (a.max(a.splat(0.0)) + least, c.max(c.splat(0.0)) + least);
-    let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
-    let most = a.splat(LARGEST_ELLIPSE);
-    ([a, b, c], [(c * inverse).sqrt().min(most), (a * inverse).sqrt().min(most)])
-}
-
-/// The projection of batches by one camera.
-#[derive(Clone, Copy)]
-pub(crate) struct Projection<'a> {
-    pub(crate) pass: &'a SplatPass<'a>,
-    pub(crate) surfels: &'a Surfels,
-    pub(crate) camera: &'a CameraInstance,
-    pub(crate) patch: &'a Patch,
-    pub(crate) stride: u32,
-}
-
-impl Projection<'_> {
-    /// Projects what is packed; appends what lands in the tile; returns how many have an image.
-    #[inline(always)]
-    fn run<S: Simd, V: Vector<S>>(
-        &self,
-        simd: S,
-        packed: &Packed,
-        count: usize,
-        hits: &mut Hits,
-    ) -> u64 {
-        let mut valid = 0;
-        let offset = match self.pass.shape {
-            SplatShape::Ellipse | SplatShape::Square1 => BORDER as f32,
-            SplatShape::Square2 => BORDER as f32 - 0.5,
-        };
-        let (zero, one) = (V::broadcast(simd, 0.0), V::broadcast(simd, 1.0));
-        // An ellipse may reach the tile from outside.
-        let beyond = match self.pass.shape {
-            SplatShape::Ellipse => LARGEST_ELLIPSE,
-            _ => 0.0,
-        };
-        let before = V::broadcast(simd, -beyond);
-        let width = V::broadcast(simd, (self.stride - BORDER) as f32 + beyond);
-        let rows = self.patch.rect.height() * self.pass.samples;
-        let height = V::broadcast(simd, (rows + BORDER) as f32 + beyond);
-        let mut len = 0;
-        let mut i = 0;
-        while i < count {
-            let lanes = (count - i).min(V::LANES as usize);
-            let active = V::mask(simd, (1u64 << lanes) - 1);
-            let v1 = &self.camera.camera.v1;
-            let q = [
-                V::load(simd, &packed.x[i..]) - v1[0],
-                V::load(simd, &packed.y[i..]) - v1[1],
-                V::load(simd, &packed.z[i..]) - v1[2],
-            ];
-            let lo = V::load(simd, &packed.lo[i..]);
-            let hi = V::load(simd, &packed.hi[i..]);
-            let size = V::load(simd, &packed.size[i..]);
-            let mut seen = 0u64;
-            let mut taken = !active;
-            for image in project(&self.camera.camera, q, lo, hi).as_slice() {
-                let front = zero.lt(image.linear(self.camera.front)) & active;
-                let inside = image.within([EDGE_TOLERANCE; 3]) & front;
-                seen |= V::bits(inside);
-                let mut drawn = image.within(self.camera.guard) & front;
-                if self.pass.first_root_only {
-                    drawn = drawn & !taken;
-                    taken = taken | drawn;
-                }
-                if !V::any(drawn) {
-                    continue;
-                }
-                let [x, y, w] = self.place(image, offset);
-                let mut lands =
-                    drawn & zero.lt(w) & before.le(x) & x.lt(width) & before.le(y) & y.lt(height);
-                if !V::any(lands) {
-                    continue;
-                }
-                let d = self.direction(image);
-                let depth = self.depth(image, d);
-                let form = self.form(image, d, size);
-                if self.pass.shape == SplatShape::Ellipse {
-                    let (form, [wide, high]) = capped(form);
-                    lands = lands
-                        & zero.le(x + wide)
-                        & (x - wide).lt(width)
-                        & zero.le(y + high)
-                        & (y - high).lt(height);
-                    if !V::any(lands) {
-                        continue;
-                    }
-                    let rise =
-                        (one / size).sqrt() * (self.camera.radius * self.camera.scale * RISE);
-                    let values = [x, y, form[0], form[1], form[2], wide, high, rise];
-                    for (value, list) in values.into_iter().zip(&mut hits.ellipse) {
-                        value.compress(lands, &mut list[len..]);
-                    }
-                } else {
-                    let cell = [x.floor(), y.floor()];
-                    let fills = self.fills(form, [cell[0] - x, cell[1] - y]);
-                    V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
-                }
-                depth.compress(lands, &mut hits.depth[len..]);
-                V::compress_numbers(simd, &packed.surfel[i..], lands, &mut hits.surfel[len..]);
-                len += V::bits(lands).count_ones() as usize;
-            }
-            valid += u64::from(seen.count_ones());
-            i += lanes;
-        }
-        hits.len = len;
-        valid
-    }
-
-    /// a, b, c: the squared distance a x² + 2 b x y + c y² from the surfel of the ray through a place (x, y) samples
-    /// away, in the surfel's radius. `d`: the ray's direction.
-    #[inline(always)]
-    fn form<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3], size: R) -> [R; 3] {
-        let [base, per_lambda] = self.camera.per_sample;
-        let right = along(base[0], per_lambda[0], image.lambda);
-        let down = along(base[1], per_lambda[1], image.lambda);
-        let per_length = size.splat(1.0) / dot(d, d);
-        let (right_d, down_d) = (dot(right, d), dot(down, d));
-        [
-            (dot(right, right) - right_d * right_d * per_length) * size,
-            (dot(right, down) - right_d * down_d * per_length) * size,
-            (dot(down, down) - down_d * down_d * per_length) * size,
-        ]
-    }
-
-    /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first sample
-    /// begins.
-    #[inline(always)]
-    fn fills<R: Real<Scalar = f32>>(&self, [a, b, c]: [R; 3], from: [R; 2]) -> R {
-        let (one, zero) = (a.splat(1.0), a.splat(0.0));
-        // A disk of that distance holds a surfel. Where it is seen so long that it leaves the splat's reach, it has
-        // to be as much wider to hold one within it.
-        let reach = self.pass.shape.reach();
-        let least = (a * c - b * b) / (a + c) * (reach * reach);
-        let mut fills = zero;
-        let pixels: &[_] = match self.pass.shape {
-            SplatShape::Ellipse => &[],
-            SplatShape::Square1 => &[(0.5, 0.5, 1.0)],
-            SplatShape::Square2 => {
-                &[(0.0, 0.0, 1.0), (1.0, 0.0, 2.0), (0.0, 1.0, 4.0), (1.0, 1.0, 8.0)]
-            }
-        };
-        for &(i, j, bit) in pixels {
-            let (x, y) = (from[0] + i, from[1] + j);
-            let distance = x * x * a + (x * y * b) * 2.0 + y * y * c;
-            let far = one.lt(distance) & one.lt(distance * least);
-            fills = fills + R::select(far, zero.splat(bit), zero);
-        }
-        fills
-    }
-
-    /// Draws ellipses: every sample of the tile within one gets its key, deeper towards the rim, so that of the
-    /// overlapping disks of one surface the nearest middle wins.
-    fn splat_ellipses(&self, hits: &Hits, tile: &mut [u64]) {
-        let stride = self.stride as usize;
-        let inner = [self.patch.rect.width(), self.patch.rect.height()];
-        let [right, bottom] = inner.map(|n| (n * self.pass.samples + BORDER - 1) as f32);
-        let left = BORDER as f32;
-        for i in 0..hits.len {
-            let [x, y, a, b, c, wide, high, rise] =
-                [0, 1, 2, 3, 4, 5, 6, 7].map(|k| hits.ellipse[k][i]);
-            let surfel = u64::from(hits.surfel[i]);
-            let depth = hits.depth[i];
-            // Centres of samples lie half a sample behind their index. Not negative: casts truncate, which is floor.
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "see above"
-            )]
-            let range = |at: f32, reach: f32, end: f32| {
-                let (from, to) = ((at - reach - 0.5).ceil().max(left), (at + reach - 0.5).min(end));
-                if from <= to { from as usize..to as usize + 1 } else { 0..0 }
-            };
-            let columns = range(x, wide, right);
-            for row in range(y, high, bottom) {
-                let dy = row as f32 + 0.5 - y;
-                let (slope, rest) = (2.0 * b * dy, c * dy * dy);
-                let samples = &mut tile[row * stride + columns.start..row * stride + columns.end];
-                for (column, sample) in columns.clone().zip(samples) {
-                    let dx = column as f32 + 0.5 - x;
-                    let distance = dx * (a * dx + slope) + rest;
-                    if distance <= 1.0 {
-                        let key = u64::from((depth + rise * distance).to_bits()) << 32 | surfel;
-                        *sample = (*sample).min(key);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Position in the tile, in pixels plus `offset`, and the homogeneous w.
-    #[inline(always)]
-    pub(crate) fn place<R: Real<Scalar = f32>>(&self, image: &Image<R>, offset: f32) -> [R; 3] {
-        let w = image.linear(self.camera.screen[2]);
-        let usable = w.splat(0.0).lt(w);
-        let inverse = w.splat(1.0) / R::select(usable, w, w.splat(1.0));
-        let x = image.linear(self.camera.screen[0]) * inverse + offset;
-        let y = image.linear(self.camera.screen[1]) * inverse + offset;
-        [x, y, w]
-    }
-
-    /// The direction d(w) of the ray.
-    #[inline(always)]
-    pub(crate) fn direction<R: Real<Scalar = f32>>(&self, image: &Image<R>) -> [R; 3] {
-        let camera = &self.camera.camera;
-        [
-            image.linear([camera.d1[0], camera.f1[0], camera.f2[0]]),
-            image.linear([camera.d1[1], camera.f1[1], camera.f2[1]]),
-            image.linear([camera.d1[2], camera.f1[2], camera.f2[2]]),
-        ]
-    }
-
-    /// The depth key: not negative. `d`: the ray's direction.
-    #[inline(always)]
-    pub(crate) fn depth<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3]) -> R {
-        let mut depth = image.lambda * dot(d, d).sqrt();
-        if self.pass.depth == DepthKey::PushBack {
-            let [x, y, z] = self.camera.from_eye;
-            let v = [image.linear(x), image.linear(y), image.linear(z)];
-            depth = depth + dot(v, v).sqrt();
-        }
-        (depth * self.camera.scale).max(image.lambda.splat(0.0))
     }
 }

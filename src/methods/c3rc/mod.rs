@@ -7,8 +7,11 @@ mod guard;
 
 use std::time::Instant;
 
-use super::{FrameInput, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, Preset, Value};
-use crate::camera::three_ray::{BoxTest, RayScale};
+use super::{
+    FrameInput, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, Preset, RAY_SCALE, Value,
+    ray_scale,
+};
+use crate::camera::three_ray::BoxTest;
 use crate::cull::Culler;
 use crate::error::Result;
 use crate::plan::{DepthKey, Pass, Plan, SplatPass, SplatShape};
@@ -63,14 +66,7 @@ static INFO: MethodInfo = MethodInfo {
             default: Value::Choice("lambda"),
             is_quality_knob: false,
         },
-        ParamInfo {
-            id: "ray-scale",
-            about: "length of a camera's three rays (unit: as in the paper)",
-            unit: "",
-            kind: ParamKind::Choice(&["eye-distance", "unit"]),
-            default: Value::Choice("eye-distance"),
-            is_quality_knob: false,
-        },
+        RAY_SCALE,
         ParamInfo {
             id: "roots",
             about: "images of a point that a camera draws: all, or only the first as in the paper",
@@ -93,11 +89,6 @@ static INFO: MethodInfo = MethodInfo {
         leaf_points: Some(122),
     }],
 };
-
-/// Which rays a word of the parameter `ray-scale` means.
-pub(crate) fn ray_scale(word: &str) -> RayScale {
-    if word == "unit" { RayScale::Unit } else { RayScale::EyeDistance }
-}
 
 impl Method for C3rc {
     fn info(&self) -> &'static MethodInfo {

@@ -3,7 +3,7 @@
 mod gather;
 pub mod trace;
 
-use super::{FrameInput, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, Value};
+use super::{FrameInput, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, RAY_SCALE, Value};
 use crate::camera::mirror_ray::RaySource;
 use crate::error::Result;
 use crate::plan::{GatherPass, Pass, Plan};
@@ -40,14 +40,7 @@ static INFO: MethodInfo = MethodInfo {
             default: Value::Choice("on"),
             is_quality_knob: false,
         },
-        ParamInfo {
-            id: "ray-scale",
-            about: "length of a camera's three rays (unit: as in the paper)",
-            unit: "",
-            kind: ParamKind::Choice(&["eye-distance", "unit"]),
-            default: Value::Choice("eye-distance"),
-            is_quality_knob: false,
-        },
+        RAY_SCALE,
     ],
     presets: &[],
 };
@@ -70,7 +63,7 @@ impl Method for RayTraced {
                 "camera" => RaySource::Camera,
                 _ => RaySource::Surface,
             },
-            scale: super::c3rc::ray_scale(params.choice("ray-scale")),
+            scale: super::ray_scale(params.choice("ray-scale")),
             spp: params.integer("spp"),
             mirror_occlusion: params.choice("mirror-occlusion") == "on",
         };

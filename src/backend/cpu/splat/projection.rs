@@ -1,0 +1,204 @@
+//! The projection of what is packed by one camera.
+
+use fearless_simd::Simd;
+
+use super::hits::Hits;
+use super::packed::Packed;
+use super::{BORDER, EDGE_TOLERANCE, RISE};
+use crate::camera::three_ray::project::along;
+use crate::camera::three_ray::{Image, project};
+use crate::geometry::Surfels;
+use crate::geometry::lanes::{Real, Vector, dot};
+use crate::plan::{CameraInstance, DepthKey, LARGEST_ELLIPSE, SplatPass, SplatShape};
+use crate::visibility::Patch;
+
+/// An ellipse's form (see [`Projection::form`]) that ends at [`LARGEST_ELLIPSE`], and half its width and height.
+#[inline(always)]
+fn capped<R: Real<Scalar = f32>>([a, b, c]: [R; 3]) -> ([R; 3], [R; 2]) {
+    let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
+    let (a, c) = (a.max(a.splat(0.0)) + least, c.max(c.splat(0.0)) + least);
+    let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
+    let most = a.splat(LARGEST_ELLIPSE);
+    ([a, b, c], [(c * inverse).sqrt().min(most), (a * inverse).sqrt().min(most)])
+}
+
+/// The projection of batches by one camera.
+#[derive(Clone, Copy)]
+pub(crate) struct Projection<'a> {
+    pub(crate) pass: &'a SplatPass<'a>,
+    pub(crate) surfels: &'a Surfels,
+    pub(crate) camera: &'a CameraInstance,
+    pub(crate) patch: &'a Patch,
+    pub(crate) stride: u32,
+}
+
+impl Projection<'_> {
+    /// Projects what is packed; appends what lands in the tile; returns how many have an image.
+    #[inline(always)]
+    pub(super) fn run<S: Simd, V: Vector<S>>(
+        &self,
+        simd: S,
+        packed: &Packed,
+        count: usize,
+        hits: &mut Hits,
+    ) -> u64 {
+        let mut valid = 0;
+        let offset = match self.pass.shape {
+            SplatShape::Ellipse | SplatShape::Square1 => BORDER as f32,
+            SplatShape::Square2 => BORDER as f32 - 0.5,
+        };
+        let (zero, one) = (V::broadcast(simd, 0.0), V::broadcast(simd, 1.0));
+        // An ellipse may reach the tile from outside.
+        let beyond = match self.pass.shape {
+            SplatShape::Ellipse => LARGEST_ELLIPSE,
+            _ => 0.0,
+        };
+        let before = V::broadcast(simd, -beyond);
+        let width = V::broadcast(simd, (self.stride - BORDER) as f32 + beyond);
+        let rows = self.patch.rect.height() * self.pass.samples;
+        let height = V::broadcast(simd, (rows + BORDER) as f32 + beyond);
+        let mut len = 0;
+        let mut i = 0;
+        while i < count {
+            let lanes = (count - i).min(V::LANES as usize);
+            let active = V::mask(simd, (1u64 << lanes) - 1);
+            let v1 = &self.camera.camera.v1;
+            let q = [
+                V::load(simd, &packed.x[i..]) - v1[0],
+                V::load(simd, &packed.y[i..]) - v1[1],
+                V::load(simd, &packed.z[i..]) - v1[2],
+            ];
+            let lo = V::load(simd, &packed.lo[i..]);
+            let hi = V::load(simd, &packed.hi[i..]);
+            let size = V::load(simd, &packed.size[i..]);
+            let mut seen = 0u64;
+            let mut taken = !active;
+            for image in project(&self.camera.camera, q, lo, hi).as_slice() {
+                let front = zero.lt(image.linear(self.camera.front)) & active;
+                let inside = image.within([EDGE_TOLERANCE; 3]) & front;
+                seen |= V::bits(inside);
+                let mut drawn = image.within(self.camera.guard) & front;
+                if self.pass.first_root_only {
+                    drawn = drawn & !taken;
+                    taken = taken | drawn;
+                }
+                if !V::any(drawn) {
+                    continue;
+                }
+                let [x, y, w] = self.place(image, offset);
+                let mut lands =
+                    drawn & zero.lt(w) & before.le(x) & x.lt(width) & before.le(y) & y.lt(height);
+                if !V::any(lands) {
+                    continue;
+                }
+                let d = self.direction(image);
+                let depth = self.depth(image, d);
+                let form = self.form(image, d, size);
+                if self.pass.shape == SplatShape::Ellipse {
+                    let (form, [wide, high]) = capped(form);
+                    lands = lands
+                        & zero.le(x + wide)
+                        & (x - wide).lt(width)
+                        & zero.le(y + high)
+                        & (y - high).lt(height);
+                    if !V::any(lands) {
+                        continue;
+                    }
+                    let rise =
+                        (one / size).sqrt() * (self.camera.radius * self.camera.scale * RISE);
+                    let values = [x, y, form[0], form[1], form[2], wide, high, rise];
+                    for (value, list) in values.into_iter().zip(&mut hits.ellipse) {
+                        value.compress(lands, &mut list[len..]);
+                    }
+                } else {
+                    let cell = [x.floor(), y.floor()];
+                    let fills = self.fills(form, [cell[0] - x, cell[1] - y]);
+                    V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
+                }
+                depth.compress(lands, &mut hits.depth[len..]);
+                V::compress_numbers(simd, &packed.surfel[i..], lands, &mut hits.surfel[len..]);
+                len += V::bits(lands).count_ones() as usize;
+            }
+            valid += u64::from(seen.count_ones());
+            i += lanes;
+        }
+        hits.len = len;
+        valid
+    }
+
+    /// a, b, c: the squared distance a x² + 2 b x y + c y² from the surfel of the ray through a place (x, y) samples
+    /// away, in the surfel's radius. `d`: the ray's direction.
+    #[inline(always)]
+    fn form<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3], size: R) -> [R; 3] {
+        let [base, per_lambda] = self.camera.per_sample;
+        let right = along(base[0], per_lambda[0], image.lambda);
+        let down = along(base[1], per_lambda[1], image.lambda);
+        let per_length = size.splat(1.0) / dot(d, d);
+        let (right_d, down_d) = (dot(right, d), dot(down, d));
+        [
+            (dot(right, right) - right_d * right_d * per_length) * size,
+            (dot(right, down) - right_d * down_d * per_length) * size,
+            (dot(down, down) - down_d * down_d * per_length) * size,
+        ]
+    }
+
+    /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first sample
+    /// begins.
+    #[inline(always)]
+    fn fills<R: Real<Scalar = f32>>(&self, [a, b, c]: [R; 3], from: [R; 2]) -> R {
+        let (one, zero) = (a.splat(1.0), a.splat(0.0));
+        // A disk of that distance holds a surfel. Where it is seen so long that it leaves the splat's reach, it has
+        // to be as much wider to hold one within it.
+        let reach = self.pass.shape.reach();
+        let least = (a * c - b * b) / (a + c) * (reach * reach);
+        let mut fills = zero;
+        let pixels: &[_] = match self.pass.shape {
+            SplatShape::Ellipse => &[],
+            SplatShape::Square1 => &[(0.5, 0.5, 1.0)],
+            SplatShape::Square2 => {
+                &[(0.0, 0.0, 1.0), (1.0, 0.0, 2.0), (0.0, 1.0, 4.0), (1.0, 1.0, 8.0)]
+            }
+        };
+        for &(i, j, bit) in pixels {
+            let (x, y) = (from[0] + i, from[1] + j);
+            let distance = x * x * a + (x * y * b) * 2.0 + y * y * c;
+            let far = one.lt(distance) & one.lt(distance * least);
+            fills = fills + R::select(far, zero.splat(bit), zero);
+        }
+        fills
+    }
+
+    /// Position in the tile, in pixels plus `offset`, and the homogeneous w.
+    #[inline(always)]
+    pub(crate) fn place<R: Real<Scalar = f32>>(&self, image: &Image<R>, offset: f32) -> [R; 3] {
+        let w = image.linear(self.camera.screen[2]);
+        let usable = w.splat(0.0).lt(w);
+        let inverse = w.splat(1.0) / R::select(usable, w, w.splat(1.0));
+        let x = image.linear(self.camera.screen[0]) * inverse + offset;
+        let y = image.linear(self.camera.screen[1]) * inverse + offset;
+        [x, y, w]
+    }
+
+    /// The direction d(w) of the ray.
+    #[inline(always)]
+    pub(crate) fn direction<R: Real<Scalar = f32>>(&self, image: &Image<R>) -> [R; 3] {
+        let camera = &self.camera.camera;
+        [
+            image.linear([camera.d1[0], camera.f1[0], camera.f2[0]]),
+            image.linear([camera.d1[1], camera.f1[1], camera.f2[1]]),
+            image.linear([camera.d1[2], camera.f1[2], camera.f2[2]]),
+        ]
+    }
+
+    /// The depth key: not negative. `d`: the ray's direction.
+    #[inline(always)]
+    pub(crate) fn depth<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3]) -> R {
+        let mut depth = image.lambda * dot(d, d).sqrt();
+        if self.pass.depth == DepthKey::PushBack {
+            let [x, y, z] = self.camera.from_eye;
+            let v = [image.linear(x), image.linear(y), image.linear(z)];
+            depth = depth + dot(v, v).sqrt();
+        }
+        (depth * self.camera.scale).max(image.lambda.splat(0.0))
+    }
+}
