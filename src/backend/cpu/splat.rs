@@ -19,7 +19,7 @@ use super::pool::Pool;
 use crate::geometry::Surfels;
 use crate::geometry::lanes::{Pair, simd_level};
 use crate::geometry::surfel::PADDING;
-use crate::plan::{Batch, SplatPass};
+use crate::plan::{Batch, SplatPass, SplatShape};
 use crate::visibility::{NONE_ID, Patch, Visibility};
 
 /// Nothing landed here.
@@ -93,6 +93,7 @@ pub(crate) struct Scratch {
     packed: Packed,
     hits: Hits,
     tile: Vec<u64>,
+    pinholes: Vec<(usize, u64)>,
 }
 
 /// Runs the pass. Every pixel of a mirror belongs to one patch, so no pixel is in the lists twice.
@@ -136,7 +137,7 @@ impl PatchWork<'_> {
         if cameras.is_empty() {
             return counters;
         }
-        let Scratch { batches, packed, hits, tile } = scratch;
+        let Scratch { batches, packed, hits, tile, pinholes } = scratch;
         fill_tile(tile, patch, visibility, pass.samples);
         for camera in &pass.cameras[cameras] {
             let start = Instant::now();
@@ -149,6 +150,9 @@ impl PatchWork<'_> {
             counters = counters.plus(shared.project(batches, packed, hits, tile));
         }
         let start = Instant::now();
+        if pass.shape == SplatShape::Ellipse {
+            fill_pinholes(tile, stride as usize, pinholes);
+        }
         self.resolve(tile, stride as usize, landed);
         counters.splat_ns += nanoseconds(start, Instant::now());
         counters
@@ -269,6 +273,27 @@ impl Shared<'_> {
             last = done;
         }
         counters
+    }
+}
+
+/// Closes gaps of one sample between two that are covered, where disks do not quite meet. Silhouettes stay.
+fn fill_pinholes(tile: &mut [u64], stride: usize, found: &mut Vec<(usize, u64)>) {
+    found.clear();
+    for at in stride + 1..tile.len() - stride - 1 {
+        if tile[at] != EMPTY {
+            continue;
+        }
+        for (a, b) in [(at - 1, at + 1), (at - stride, at + stride)] {
+            let [a, b] = [tile[a], tile[b]];
+            // Neither is a gap nor another patch's.
+            if a.max(b) != EMPTY && a.min(b) != FOREIGN {
+                found.push((at, a.max(b)));
+                break;
+            }
+        }
+    }
+    for &(at, key) in &*found {
+        tile[at] = key;
     }
 }
 
