@@ -40,6 +40,8 @@ const RISE: f32 = 2.0;
 const MAX_IMAGES: usize = 3;
 /// A camera with more surfels than this shares them with idle threads (untuned).
 const SHARE: usize = 1 << 15;
+/// Patches that a thread takes at a time at most: neighbours cost much or little together (untuned).
+const PATCHES: usize = 16;
 /// One column and row around the tile takes what a 2 × 2 splat writes beyond it.
 const BORDER: u32 = 1;
 
@@ -107,6 +109,7 @@ pub(crate) fn splat(
     let start = || (pool.take(), SplatCounters::default(), Vec::new());
     let done: Vec<_> = (0..pass.patches.len())
         .into_par_iter()
+        .with_max_len(PATCHES)
         .fold(start, |(mut scratch, counters, mut landed), index| {
             let work = PatchWork { pass, surfels, visibility, index, level, pool };
             let more = work.run(&mut scratch, &mut landed);
