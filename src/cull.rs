@@ -162,26 +162,15 @@ impl Walk<'_> {
         let parts = self.representatives + child * REPRESENTATIVES;
         if small[0] >> slot & 1 != 0 {
             Open { child: 0, first: own + slot, count: 1, ..all }
-        } else if small[1] >> slot & 1 != 0 {
+        } else if (small[1] | small[2]) >> slot & 1 != 0 {
+            let (each, offset) = if small[1] >> slot & 1 != 0 { (4, QUADS) } else { (2, PAIRS) };
             match child {
                 // Of a leaf every fourth surfel, or every second, stands for its neighbours.
-                0 => Open { count: all.count.div_ceil(4), stride: 4, ..all },
-                _ => Open {
-                    child: 0,
-                    first: parts + QUADS,
-                    count: self.used(child).div_ceil(4),
-                    ..all
-                },
-            }
-        } else if small[2] >> slot & 1 != 0 {
-            match child {
-                0 => Open { count: all.count.div_ceil(2), stride: 2, ..all },
-                _ => Open {
-                    child: 0,
-                    first: parts + PAIRS,
-                    count: self.used(child).div_ceil(2),
-                    ..all
-                },
+                0 => Open { count: all.count.div_ceil(each), stride: each, ..all },
+                _ => {
+                    let count = self.used(child).div_ceil(each);
+                    Open { child: 0, first: parts + offset, count, ..all }
+                }
             }
         } else if tested.inside >> slot & 1 != 0 && self.per_pixel == 0.0 {
             Open { child: 0, ..all }

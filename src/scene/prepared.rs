@@ -36,8 +36,8 @@ impl Default for PrepareOptions {
 
 /// Leaves few holes in the built-in scenes.
 pub const DEFAULT_SURFELS: usize = 3_000_000;
-/// Surfel indices are 32 bits, with one value kept for "none" and room for padding.
-pub const MAX_SURFELS: usize = (u32::MAX / 2) as usize;
+/// Surfel indices are 32 bits, and a surfel may bring as many as fourteen representatives.
+pub const MAX_SURFELS: usize = (u32::MAX / 16) as usize;
 
 /// What preparing took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

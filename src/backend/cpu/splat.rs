@@ -82,7 +82,7 @@ pub(crate) struct Landed {
     pub(crate) pixel: u32,
     /// Share of its samples that are covered.
     pub(crate) coverage: f32,
-    /// Sum over those of the surfels' radiance, over all samples.
+    /// Mean of the surfels' radiance over all samples, 0 where nothing landed.
     pub(crate) radiance: Vec3,
     /// The nearest key of its samples.
     pub(crate) key: u64,
