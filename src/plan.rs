@@ -119,6 +119,8 @@ pub enum DepthKey {
 pub struct SplatPass<'a> {
     /// Visible parts of the mirrors.
     pub patches: Vec<Patch>,
+    /// For patches whose pixels are given one by one: a word a row of their rectangle, bit 0 its left end.
+    pub rows: Vec<u32>,
     /// By patch, then by object.
     pub cameras: Vec<CameraInstance>,
     /// Patch i owns cameras `patch_cameras[i]..patch_cameras[i + 1]`.

@@ -20,7 +20,7 @@ use crate::geometry::Surfels;
 use crate::geometry::lanes::{Pair, simd_level};
 use crate::geometry::surfel::PADDING;
 use crate::plan::{Batch, SplatPass, SplatShape};
-use crate::visibility::{NONE_ID, Patch, Visibility};
+use crate::visibility::{Patch, Visibility};
 
 /// Nothing landed here.
 pub(crate) const EMPTY: u64 = u64::MAX;
@@ -141,7 +141,7 @@ impl PatchWork<'_> {
             return counters;
         }
         let Scratch { batches, packed, hits, tile, pinholes } = scratch;
-        fill_tile(tile, patch, visibility, pass.samples);
+        fill_tile(tile, pass, patch, visibility);
         for camera in &pass.cameras[cameras] {
             let start = Instant::now();
             batches.clear();
@@ -231,7 +231,7 @@ impl Shared<'_> {
         let (a, b) = rayon::join(
             || self.project(left, packed, hits, tile),
             || {
-                fill_tile(other_tile, self.work.patch, self.visibility, self.work.pass.samples);
+                fill_tile(other_tile, self.work.pass, self.work.patch, self.visibility);
                 self.project(right, other_packed, other_hits, other_tile)
             },
         );
@@ -300,22 +300,18 @@ fn fill_pinholes(tile: &mut [u64], stride: usize, found: &mut Vec<(usize, u64)>)
     }
 }
 
-fn fill_tile(tile: &mut Vec<u64>, patch: &Patch, visibility: &Visibility, samples: u32) {
-    let side = samples as usize;
-    let stride = (patch.rect.width() * samples + 2 * BORDER) as usize;
+fn fill_tile(tile: &mut Vec<u64>, pass: &SplatPass<'_>, patch: &Patch, visibility: &Visibility) {
+    let side = pass.samples as usize;
+    let stride = patch.rect.width() as usize * side + 2 * BORDER as usize;
     tile.clear();
-    tile.resize(stride * (patch.rect.height() * samples + 2 * BORDER) as usize, FOREIGN);
+    tile.resize(stride * (patch.rect.height() as usize * side + 2 * BORDER as usize), FOREIGN);
     for y in patch.rect.min[1]..patch.rect.max[1] {
-        let from = (y * visibility.size.width + patch.rect.min[0]) as usize;
-        let ids = &visibility.mirror_ids[from..from + patch.rect.width() as usize];
-        let at =
-            ((y - patch.rect.min[1]) as usize * side + BORDER as usize) * stride + BORDER as usize;
-        for (i, (x, &id)) in (patch.rect.min[0]..).zip(ids).enumerate() {
-            debug_assert!(id != NONE_ID || patch.triangle.0 != NONE_ID);
-            if id == patch.triangle.0 && patch.cell.is_none_or(|c| c.contains(x, y)) {
+        let row = (y - patch.rect.min[1]) as usize * side + BORDER as usize;
+        for x in patch.rect.min[0]..patch.rect.max[0] {
+            if patch.owns(visibility, &pass.rows, x, y) {
+                let at = row * stride + (x - patch.rect.min[0]) as usize * side + BORDER as usize;
                 for j in 0..side {
-                    let at = at + j * stride + i * side;
-                    tile[at..at + side].fill(EMPTY);
+                    tile[at + j * stride..at + j * stride + side].fill(EMPTY);
                 }
             }
         }

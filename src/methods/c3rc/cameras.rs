@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::super::FrameInput;
+use super::cells::CellRays;
 use super::footprint::Footprint;
 use super::guard::{self, Guard, MAX_GUARD, Reach};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
@@ -53,6 +54,7 @@ impl CameraSettings {
 pub(super) fn cameras(
     frame: FrameInput<'_>,
     patches: &[Patch],
+    cells: Option<&[CellRays]>,
     settings: CameraSettings,
 ) -> (Vec<CameraInstance>, Vec<u32>) {
     let top = Top::new(frame.scene, frame.eye);
@@ -63,7 +65,8 @@ pub(super) fn cameras(
             let mut list = Vec::new();
             for (i, patch) in patches.iter().enumerate() {
                 let index = u32::try_from(chunk * 32 + i).expect("fewer patches than pixels");
-                of_patch(frame, &top, patch, index, settings, &mut list);
+                let cell = cells.map(|cells| &cells[index as usize]);
+                of_patch(frame, &top, patch, cell, index, settings, &mut list);
             }
             list
         })
@@ -112,25 +115,35 @@ fn of_patch(
     frame: FrameInput<'_>,
     top: &Top,
     patch: &Patch,
+    cell: Option<&CellRays>,
     index: u32,
     settings: CameraSettings,
     out: &mut Vec<CameraInstance>,
 ) {
     let FrameInput { scene, eye, visibility } = frame;
-    let mirror = scene.mirror_triangle(patch.triangle.0);
-    let whole = Rays {
-        origins: mirror.corners.map(|v| v.as_dvec3()),
-        directions: mirror.corner_directions(eye.position, settings.ray_scale),
+    let (rays, front) = match cell {
+        Some(cell) => (cell.rays, [1.0; 3]),
+        None => {
+            let mirror = scene.mirror_triangle(patch.triangle.0);
+            let whole = Rays {
+                origins: mirror.corners.map(|v| v.as_dvec3()),
+                directions: mirror.corner_directions(eye.position, settings.ray_scale),
+            };
+            let facing = DVec3::from_array(mirror.facing(eye.position));
+            (whole.part(patch.corners), patch.corners.map(|w| w.dot(facing)))
+        }
     };
-    let rays = whole.part(patch.corners);
     let [v1, v2, v3] = rays.origins;
     if (v2 - v1).cross(v3 - v1) == DVec3::ZERO {
         return;
     }
     let position = eye.position.as_dvec3();
-    let facing = DVec3::from_array(mirror.facing(eye.position));
     let corners_px = rays.origins.map(|v| homogeneous(eye, v));
-    let around = rays.grown(guard::around(&corners_px, patch, settings.reach()));
+    let around = match cell {
+        Some(_) => guard::around_rect(&corners_px, patch, settings.reach()),
+        None => guard::around(&corners_px, patch, settings.reach()),
+    };
+    let around = rays.grown(around);
     let volume = ViewVolume::<f32>::new(&around);
     let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
     let size = rays.origins.map(|v| (v - position).length());
@@ -155,19 +168,31 @@ fn of_patch(
             let range = [tested.lo[slot], tested.hi[slot]];
             let radius = EVENNESS * f64::from(scene.objects[object].extent);
             let (front, screen, guard) = exact.get_or_insert_with(|| {
-                let front = linear_form(patch.corners.map(|w| w.dot(facing)));
                 let screen = screen_forms(eye, patch, rays.origins, samples);
-                (front, screen, Guard::new(&corners_px, visibility, patch, settings.reach()))
+                let guard = match cell {
+                    Some(_) => Guard::of_rect(&corners_px, patch, settings.reach()),
+                    None => Guard::new(&corners_px, visibility, patch, settings.reach()),
+                };
+                (linear_form(front), screen, guard)
             });
             let before = corners_px.iter().all(|c| c.z > 0.0);
             let seen_px = corners_px.map(|c| if before { c.truncate() / c.z } else { DVec2::NAN });
             let footprint = Footprint::new(&seen_px, &own);
-            let detail = own_detail(settings.detail, &corners_px, &footprint, range.map(f64::from));
+            let detail = match cell {
+                Some(_) => settings.detail,
+                None => {
+                    own_detail(settings.detail, &corners_px, &footprint, range.map(f64::from))
+                }
+            };
             // A representative's disk has the area of a share of a pixel.
             let holds = |lambda: f64| {
                 let area = if detail > 0.0 { footprint.area_per_px(lambda) / detail } else { 0.0 };
                 radius.max(EVENNESS * (area / std::f64::consts::PI).sqrt())
             };
+            if std::env::var_os("CELLR").is_some() {
+                let r = [range[0], 0.5*(range[0]+range[1]), range[1]].map(|l| holds(l.into()) * footprint.px_per_unit(l.into()));
+                eprintln!("R {} {:?} {:?}", patch.pixels, r, range);
+            }
             let guard = guard.holding(holds, &footprint, range.map(f64::from));
             let own_grown = own.grown(guard);
             let several = mixed_sign_range(&own_grown, range[0].into(), range[1].into());

@@ -9,6 +9,8 @@ use crate::visibility::{Patch, Visibility};
 /// Furthest guard as a weight. Rays are not extrapolated further than this: a triangle much thinner than a
 /// pixel sees many surfels a pixel anyway (untuned).
 pub(super) const MAX_GUARD: f64 = 0.5;
+/// The same for cells, whose rays are linear about them: nearly no bound.
+const FAR_OUT: f64 = 64.0;
 /// Added for the rounding of weights to f32.
 const SLACK: f64 = 1e-3;
 
@@ -40,6 +42,16 @@ impl Guard {
         reach: Reach,
     ) -> Self {
         Self { margins: margins(corners, visibility, patch, reach), reach }
+    }
+
+    /// For all pixels of the patch's rectangle.
+    pub(super) fn of_rect(corners: &[DVec3; 3], patch: &Patch, reach: Reach) -> Self {
+        let weights = Weights::new(corners);
+        let margins = STEPS.map(|step| {
+            let least = least_around(&weights, patch, reach.samples + step * reach.splat - 0.5);
+            (DVec3::splat(SLACK) - least).min(DVec3::splat(FAR_OUT))
+        });
+        Self { margins, reach }
     }
 
     /// The margins for surfels of which a disk of this radius (by λ) about any point of a surface holds one, seen at λ
@@ -104,12 +116,21 @@ fn margin(least: DVec3) -> DVec3 {
 
 /// Margins that are never less than those of any [`Guard`] of the patch, at once: for what need not be exact.
 pub(super) fn around(corners: &[DVec3; 3], patch: &Patch, reach: Reach) -> DVec3 {
-    let weights = Weights::new(corners);
-    let reach = reach.samples + reach.splat - 0.5;
+    margin(least_around(&Weights::new(corners), patch, reach.samples + reach.splat - 0.5))
+}
+
+/// The same for [`Guard::of_rect`].
+pub(super) fn around_rect(corners: &[DVec3; 3], patch: &Patch, reach: Reach) -> DVec3 {
+    let least = least_around(&Weights::new(corners), patch, reach.samples + reach.splat - 0.5);
+    (DVec3::splat(SLACK) - least).min(DVec3::splat(FAR_OUT))
+}
+
+/// The least weights about a patch's rectangle.
+fn least_around(weights: &Weights, patch: &Patch, reach: f64) -> DVec3 {
     let [left, top] = patch.rect.min.map(|v| f64::from(v) - reach);
     let [right, bottom] = patch.rect.max.map(|v| f64::from(v) + reach);
     let corners = [(left, top), (right, top), (left, bottom), (right, bottom)];
-    margin(corners.into_iter().fold(DVec3::INFINITY, |m, (x, y)| m.min(weights.at(x, y))))
+    corners.into_iter().fold(DVec3::INFINITY, |m, (x, y)| m.min(weights.at(x, y)))
 }
 
 /// Barycentrics of picture positions.
@@ -185,6 +206,7 @@ mod tests {
             rect,
             pixels,
             cell: None,
+            rows: None,
         };
         (corners, visibility, patch)
     }

@@ -2,6 +2,7 @@
 //! culled against the surfels' trees (backward), which then projects and splats what is left (forward).
 
 mod cameras;
+mod cells;
 mod footprint;
 mod guard;
 
@@ -26,6 +27,14 @@ static INFO: MethodInfo = MethodInfo {
     about: "point splatting with continuous 3-ray cameras",
     citation: "Mei, Popescu & Sacks 2007, A Hybrid Backward-Forward Method for Interactive Reflections",
     params: &[
+        ParamInfo {
+            id: "cameras",
+            about: "what one camera sees for: a triangle of the mirror, or pixels whose exact rays are nearly linear",
+            unit: "",
+            kind: ParamKind::Choice(&["triangles", "cells"]),
+            default: Value::Choice("triangles"),
+            is_quality_knob: true,
+        },
         ParamInfo {
             id: "test",
             about: "how tree nodes are tested against a camera's view volume (paper: not conservative)",
@@ -118,9 +127,22 @@ impl Method for C3rc {
             detail: f64::from(detail),
         };
         let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
-        let mut list = Vec::new();
-        patches(frame.eye, frame.visibility, corners, &mut PatchScratch::default(), &mut list);
-        let (cameras, patch_cameras) = cameras::cameras(frame, &list, settings);
+        let cells = (params.choice("cameras") == "cells")
+            .then(|| cells::cells(frame, settings.ray_scale));
+        let (list, rays, rows) = match cells {
+            Some(cells) => (cells.patches, Some(cells.rays), cells.rows),
+            None => {
+                let mut list = Vec::new();
+                let mut scratch = PatchScratch::default();
+                patches(frame.eye, frame.visibility, corners, &mut scratch, &mut list);
+                (list, None, Vec::new())
+            }
+        };
+        if std::env::var_os("CELLT").is_some() { eprintln!("patches {:.2}", milliseconds(start));
+            let mut h = std::collections::BTreeMap::new();
+            for p in &list { let k = p.pixels.ilog2(); let e = h.entry(k).or_insert((0,0)); e.0 += 1; e.1 += p.pixels; }
+            eprintln!("{h:?}"); }
+        let (cameras, patch_cameras) = cameras::cameras(frame, &list, rays.as_deref(), settings);
         out.times.cameras_ms = milliseconds(start);
         let test = match params.choice("test") {
             "none" => BoxTest::None,
@@ -131,6 +153,7 @@ impl Method for C3rc {
         };
         out.passes.push(Pass::Splat(Box::new(SplatPass {
             patches: list,
+            rows,
             cameras,
             patch_cameras,
             batches: Box::new(Culler::new(scene, test)),

@@ -1,0 +1,200 @@
+//! The exact rays of one tile: for every pixel the view ray, reflected at the interpolated normal.
+
+use glam::{DVec3, Vec3};
+
+use super::TILE;
+use crate::camera::Eye;
+use crate::scene::prepared::PreparedScene;
+use crate::visibility::{NONE_ID, Visibility};
+
+/// Elements of a tile, by row.
+pub(super) const AREA: usize = TILE * TILE;
+
+/// Quantities that are linear over the picture, at (x, y) pixels from the middle of the tile.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Linear<const N: usize> {
+    pub(super) at: [f32; N],
+    pub(super) right: [f32; N],
+    pub(super) down: [f32; N],
+}
+
+impl<const N: usize> Default for Linear<N> {
+    fn default() -> Self {
+        Self { at: [0.0; N], right: [0.0; N], down: [0.0; N] }
+    }
+}
+
+impl<const N: usize> Linear<N> {
+    #[inline(always)]
+    pub(super) fn get(&self, k: usize, x: f32, y: f32) -> f32 {
+        self.at[k] + x * self.right[k] + y * self.down[k]
+    }
+}
+
+/// The position of the centre of column or row `i`, relative to the middle of its tile.
+#[inline(always)]
+pub(super) fn centre(i: usize) -> f32 {
+    i as f32 + 0.5 - TILE as f32 * 0.5
+}
+
+/// A mirror triangle as a tile sees it: both quantities are linear in the picture.
+#[derive(Clone, Copy)]
+struct Facet {
+    id: u32,
+    /// A multiple of the interpolated normal, and the inverse depth along the eye's `forward`.
+    normal_and_inverse: Linear<4>,
+}
+
+/// Facets that a tile keeps at hand, by the low bits of their ids.
+const FACETS: usize = 64;
+
+/// One quantity a pixel. A ray that leaves the mirror at depth z runs along z · (`field[0]`, `field[1]`, `field[2]`);
+/// `field[3]` is 1/z.
+pub(super) struct RayField {
+    pub(super) field: [[f32; AREA]; 4],
+    pub(super) ids: [u32; AREA],
+    view: Linear<3>,
+    facets: [Facet; FACETS],
+}
+
+impl RayField {
+    pub(super) fn new() -> Box<Self> {
+        let facet = Facet { id: NONE_ID, normal_and_inverse: Linear::default() };
+        Box::new(Self {
+            field: [[0.0; AREA]; 4],
+            ids: [NONE_ID; AREA],
+            view: Linear::default(),
+            facets: [facet; FACETS],
+        })
+    }
+
+    /// Fills in the tile whose first pixel is (`left`, `top`); returns by row which pixels show a mirror.
+    pub(super) fn fill(
+        &mut self,
+        eye: &Eye,
+        scene: &PreparedScene,
+        visibility: &Visibility,
+        [left, top]: [u32; 2],
+    ) -> [u32; TILE] {
+        let mut shown = [0u32; TILE];
+        let size = eye.size;
+        let columns = (size.width - left).min(TILE as u32) as usize;
+        let rows = (size.height - top).min(TILE as u32) as usize;
+        self.ids.fill(NONE_ID);
+        for (y, shown) in shown.iter_mut().enumerate().take(rows) {
+            let from = (top as usize + y) * size.width as usize + left as usize;
+            let ids = &visibility.mirror_ids[from..from + columns];
+            self.ids[y * TILE..y * TILE + columns].copy_from_slice(ids);
+            for (x, &id) in ids.iter().enumerate() {
+                *shown |= u32::from(id != NONE_ID) << x;
+            }
+        }
+        if shown == [0; TILE] {
+            return shown;
+        }
+        let half = TILE as f32 * 0.5;
+        let middle = [left as f32 + half, top as f32 + half];
+        let (right, down) = (eye.right / eye.focal_px, -eye.up / eye.focal_px);
+        self.view = Linear {
+            at: eye.ray_through_px(middle.into()).to_array(),
+            right: right.to_array(),
+            down: down.to_array(),
+        };
+        for facet in &mut self.facets {
+            facet.id = NONE_ID;
+        }
+        for y in 0..rows {
+            let mut x = 0;
+            while x < columns {
+                let id = self.ids[y * TILE + x];
+                let from = x;
+                while x < columns && self.ids[y * TILE + x] == id {
+                    x += 1;
+                }
+                if id != NONE_ID {
+                    let facet = self.facet(eye, scene, id, middle);
+                    for x in from..x {
+                        let ray = reflected(&self.view, &facet, centre(x), centre(y));
+                        for (field, value) in self.field.iter_mut().zip(ray) {
+                            field[y * TILE + x] = value;
+                        }
+                    }
+                }
+            }
+        }
+        shown
+    }
+
+    /// The field about a pixel as its own triangle continues it.
+    pub(super) fn tangent(
+        &mut self,
+        eye: &Eye,
+        scene: &PreparedScene,
+        [left, top]: [u32; 2],
+        [x, y]: [usize; 2],
+    ) -> Linear<4> {
+        let half = TILE as f32 * 0.5;
+        let middle = [left as f32 + half, top as f32 + half];
+        let facet = self.facet(eye, scene, self.ids[y * TILE + x], middle);
+        let (x, y) = (centre(x), centre(y));
+        let at = |dx: f32, dy: f32| reflected(&self.view, &facet, x + dx, y + dy);
+        let [a, b, c, d] = [at(-0.5, 0.0), at(0.5, 0.0), at(0.0, -0.5), at(0.0, 0.5)];
+        let own = at(0.0, 0.0);
+        let mut tangent = Linear::default();
+        for k in 0..4 {
+            tangent.right[k] = b[k] - a[k];
+            tangent.down[k] = d[k] - c[k];
+            tangent.at[k] = own[k] - x * tangent.right[k] - y * tangent.down[k];
+        }
+        tangent
+    }
+
+    fn facet(&mut self, eye: &Eye, scene: &PreparedScene, id: u32, middle: [f32; 2]) -> Facet {
+        let slot = id as usize % FACETS;
+        if self.facets[slot].id != id {
+            self.facets[slot] = Facet { id, normal_and_inverse: of_triangle(eye, scene, id, middle) };
+        }
+        self.facets[slot]
+    }
+}
+
+#[inline(always)]
+fn reflected(view: &Linear<3>, facet: &Facet, x: f32, y: f32) -> [f32; 4] {
+    let v = [view.get(0, x, y), view.get(1, x, y), view.get(2, x, y)];
+    let of = &facet.normal_and_inverse;
+    let n = [of.get(0, x, y), of.get(1, x, y), of.get(2, x, y)];
+    let along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2];
+    let squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    let twice = 2.0 * along / squared.max(f32::MIN_POSITIVE);
+    [v[0] - n[0] * twice, v[1] - n[1] * twice, v[2] - n[2] * twice, of.get(3, x, y)]
+}
+
+/// The weights of the corners at a picture position are proportional to linear functions of it.
+#[expect(clippy::cast_possible_truncation, reason = "rounded once")]
+fn of_triangle(eye: &Eye, scene: &PreparedScene, id: u32, middle: [f32; 2]) -> Linear<4> {
+    let mirror = scene.mirror_triangle(id);
+    let position = eye.position.as_dvec3();
+    let [a, b, c] = mirror.corners.map(|v| v.as_dvec3() - position);
+    // The volume that the view ray spans with two corners is its third weight, times the inverse depth, times the
+    // volume of all three.
+    let volume = a.dot(b.cross(c));
+    let planes = [b.cross(c), c.cross(a), a.cross(b)].map(|n| n / volume);
+    let view = eye.ray_through_px(middle.into()).as_dvec3();
+    let (right, down) = ((eye.right / eye.focal_px).as_dvec3(), (-eye.up / eye.focal_px).as_dvec3());
+    let weighted = |direction: DVec3| {
+        let w = planes.map(|plane| plane.dot(direction));
+        let mut normal = DVec3::ZERO;
+        for (w, n) in w.iter().zip(mirror.normals) {
+            normal += *w * n.as_dvec3();
+        }
+        (normal, w[0] + w[1] + w[2])
+    };
+    let (at, along_right, along_down) = (weighted(view), weighted(right), weighted(down));
+    // Only the direction of the normal matters: numbers near 1 for f32.
+    let scale = 1.0 / at.0.length().max(f64::MIN_POSITIVE);
+    let four = |(n, q): (DVec3, f64)| {
+        let n: Vec3 = (n * scale).as_vec3();
+        [n.x, n.y, n.z, q as f32]
+    };
+    Linear { at: four(at), right: four(along_right), down: four(along_down) }
+}
