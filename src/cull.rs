@@ -6,7 +6,7 @@ use crate::accel::kd_tree::representatives::{PAIRS, QUADS, REPRESENTATIVES};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::three_ray::{BoxTest, Boxes, ViewVolume};
 use crate::geometry::lanes::{Real, Vector, dot_const, simd_level};
-use crate::plan::{Batch, BatchSource, CameraInstance, Gaze};
+use crate::plan::{Batch, BatchSource, CameraInstance, Gaze, Volume};
 use crate::scene::prepared::PreparedScene;
 
 /// Walks the objects' trees with one box test.
@@ -28,7 +28,6 @@ impl BatchSource for Culler<'_> {
         let object = &self.scene.objects[camera.object as usize];
         let walk = Walk {
             wide: object.tree.wide(),
-            volume: &camera.volume,
             test: self.test,
             lambda: camera.lambda,
             first: object.surfels.start,
@@ -44,7 +43,10 @@ impl BatchSource for Culler<'_> {
                 out.push(Batch { first, count, stride: 1, lambda: camera.lambda, roots: 1 });
             }
         } else {
-            dispatch!(self.level, simd => walk.run(simd, out));
+            match &camera.volume {
+                Volume::Three(volume) => dispatch!(self.level, simd => walk.run(simd, volume, out)),
+                Volume::Four(volume) => dispatch!(self.level, simd => walk.run(simd, volume, out)),
+            }
         }
         for batch in &mut out[from..] {
             let [lo, hi] = camera.several;
@@ -59,7 +61,6 @@ const WHOLE_BATCH: u32 = 1 << 12;
 
 struct Walk<'a> {
     wide: &'a [WideNode],
-    volume: &'a ViewVolume<f32>,
     test: BoxTest,
     lambda: [f32; 2],
     first: u32,
@@ -81,15 +82,21 @@ struct Open {
     lambda: [f32; 2],
 }
 
-/// Splats are not drawn out further than this lets them: half the inverse of the footprint's aspect. Where it is
-/// longer a caustic is near.
-const LEAST_ASPECT: f32 = 1.0 / 32.0;
+/// Half the length, in pixels, of the longest splat that one representative makes (untuned).
+const LONGEST_PX: f32 = 1.2;
+/// But no smaller share of the footprint than this is asked for.
+const FINEST: f32 = 0.25;
 /// A wide level at least halves the surfels, and each leaves at most seven siblings open.
 const STACK: usize = 32 * (CHILDREN - 1) + 1;
 
 impl Walk<'_> {
     #[inline(always)]
-    fn run<S: Simd>(&self, simd: S, out: &mut Vec<Batch>) {
+    fn run<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        volume: &ViewVolume<f32, N>,
+        out: &mut Vec<Batch>,
+    ) {
         let mut stack = [Open::default(); STACK];
         let mut top = 0;
         let mut at = 0;
@@ -97,7 +104,7 @@ impl Walk<'_> {
         let mut lambda = self.lambda;
         let from = out.len();
         loop {
-            let tested = test_children(simd, node, self.volume, self.test, lambda);
+            let tested = test_children(simd, node, volume, self.test, lambda);
             let mut bits = tested.meets & node.used;
             if let Some(gaze) = &self.gaze {
                 bits &= !turned_away(simd, node, gaze);
@@ -195,10 +202,14 @@ impl Walk<'_> {
         let b = lambda * (lambda * b[2] + b[1]) + b[0];
         let c = lambda * (lambda * c[2] + c[1]) + c[0];
         let radius = V::load(simd, &node.extent);
-        // The geometric mean of the footprint's two squared widths.
         let needed = radius * radius * (self.per_pixel * 2.0);
         let zero = V::broadcast(simd, 0.0);
-        let seen = (a * c - b * b).max(zero).sqrt().max((a + c) * LEAST_ASPECT);
+        let det = (a * c - b * b).max(zero);
+        // The product of the footprint's two widths, and nearly its smaller width squared: no splat is seen longer
+        // than so many pixels.
+        let longest = self.per_pixel * (2.0 * LONGEST_PX * LONGEST_PX);
+        let area = det.sqrt();
+        let seen = area.min((det / (a + c) * longest).max(area * FINEST));
         let real = zero.lt(radius);
         [
             V::<S>::bits(needed.le(seen) & real),
@@ -234,10 +245,10 @@ pub(crate) struct Tested {
 
 /// Tests the eight boxes of a node.
 #[inline(always)]
-pub(crate) fn test_children<S: Simd>(
+pub(crate) fn test_children<S: Simd, const N: usize>(
     simd: S,
     node: &WideNode,
-    volume: &ViewVolume<f32>,
+    volume: &ViewVolume<f32, N>,
     test: BoxTest,
     lambda: [f32; 2],
 ) -> Tested {

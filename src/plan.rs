@@ -13,17 +13,17 @@ pub struct CameraInstance {
     /// The projection's constants.
     pub camera: ThreeRay<f32>,
     /// The grown camera's view volume.
-    pub volume: ViewVolume<f32>,
+    pub volume: Volume,
     /// λ that can meet the object.
     pub lambda: [f32; 2],
     /// λ between which a point may have several images; reversed if nowhere.
     pub several: [f32; 2],
-    /// Length in the scene of a unit of the object's space.
-    pub scale: f32,
+    /// Direction of the ray in scene space by coordinate, linear in (b2, b3).
+    pub direction: [[f32; 3]; 3],
     /// Homogeneous screen coordinates (x·w, y·w, w) relative to the patch's rectangle, in samples, linear in (b2, b3).
     pub screen: [[f32; 3]; 3],
-    /// How the point at λ moves with the place on the screen that sees it, a sample to the right and a sample down:
-    /// `per_sample[0]` + λ `per_sample[1]`. The unit is the distance within which every point of the object's
+    /// How the point at λ moves in scene space with the place on the screen that sees it, a sample to the right and a
+    /// sample down: `per_sample[0]` + λ `per_sample[1]`. The unit is the distance within which every point of the object's
     /// surface has a surfel; 0 if that is not known, not numbers if the triangle has no area on the screen.
     pub per_sample: [[[f32; 3]; 2]; 2],
     /// Where the rays go, if what faces away from all of them is hidden.
@@ -32,7 +32,7 @@ pub struct CameraInstance {
     pub representatives: u32,
     /// A node that would be seen as less than 1/`detail` of a pixel is taken as one representative; 0: no node is.
     pub detail: f32,
-    /// What `per_sample` is measured in.
+    /// What `per_sample` is measured in, scene units.
     pub radius: f32,
     /// Radius of the disk that the object's surfels stand for; infinite if that is not known.
     pub extent: f32,
@@ -43,8 +43,17 @@ pub struct CameraInstance {
     pub guard: [f32; 3],
     /// Positive where the ray leaves the mirror on its front side, linear in (b2, b3).
     pub front: [f32; 3],
-    /// v(w) - eye in object space by coordinate, linear in (b2, b3): for push-back depth.
+    /// v(w) - eye in scene space by coordinate, linear in (b2, b3): for push-back depth.
     pub from_eye: [[f32; 3]; 3],
+}
+
+/// What a camera sees between its outermost rays.
+#[derive(Clone, Copy, Debug)]
+pub enum Volume {
+    /// Of a triangle.
+    Three(ViewVolume<f32>),
+    /// Of a rectangle on the screen.
+    Four(ViewVolume<f32, 4>),
 }
 
 /// The directions of a camera's rays: a cone.
@@ -115,12 +124,22 @@ pub enum DepthKey {
     PushBack,
 }
 
+/// What is known of the pixels of patches that are cells of the picture, by patch.
+#[derive(Clone, Debug, Default)]
+pub struct Pixels {
+    /// A word a row of the patch's rectangle, bit 0 its left end: which pixels are the patch's own.
+    pub rows: Vec<u32>,
+    /// By pixel of the rectangle: the direction of the exact ray less that of the camera's, scene space. Zero for
+    /// pixels that are not the patch's own.
+    pub deviations: Vec<[f32; 3]>,
+}
+
 /// Projects surfels and keeps the nearest at every pixel.
 pub struct SplatPass<'a> {
     /// Visible parts of the mirrors.
     pub patches: Vec<Patch>,
-    /// For patches whose pixels are given one by one: a word a row of their rectangle, bit 0 its left end.
-    pub rows: Vec<u32>,
+    /// For patches that are cells of the picture: see [`Pixels`].
+    pub pixels: Pixels,
     /// By patch, then by object.
     pub cameras: Vec<CameraInstance>,
     /// Patch i owns cameras `patch_cameras[i]..patch_cameras[i + 1]`.

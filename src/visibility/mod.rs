@@ -17,7 +17,7 @@ use glam::Vec3;
 use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
 
-pub use patches::{Cell, MirrorTriangleIndex, Patch, PatchScratch, PixelRect, patches};
+pub use patches::{Cell, MirrorTriangleIndex, OwnPixels, Patch, PatchScratch, PixelRect, patches};
 pub use project::MAX_SIDE;
 pub use raster::Scratch;
 pub use weights::{RayWeights, barycentrics};

@@ -61,19 +61,28 @@ pub struct Patch {
     pub pixels: u32,
     /// Which pixels of the triangle are the patch's; `None`: all.
     pub cell: Option<Cell>,
-    /// Where the pixels are given one by one: index of the patch's first row in [`SplatPass::rows`](crate::plan::SplatPass::rows).
-    pub rows: Option<u32>,
+    /// For a cell of the picture: where its pixels are given one by one.
+    pub own: Option<OwnPixels>,
 }
 
 impl Patch {
-    /// Whether a pixel of its rectangle is the patch's own. `rows`: the masks that its `rows` points to.
+    /// Whether a pixel of its rectangle is the patch's own. `rows`: the masks that its `own` points into.
     pub fn owns(&self, visibility: &Visibility, rows: &[u32], x: u32, y: u32) -> bool {
-        if let Some(first) = self.rows {
-            return rows[(first + y - self.rect.min[1]) as usize] >> (x - self.rect.min[0]) & 1 != 0;
+        if let Some(own) = self.own {
+            return rows[(own.first_row + y - self.rect.min[1]) as usize] >> (x - self.rect.min[0]) & 1 != 0;
         }
         visibility.mirror_ids[(y * visibility.size.width + x) as usize] == self.triangle.0
             && self.cell.is_none_or(|cell| cell.contains(x, y))
     }
+}
+
+/// Where lists by patch begin with one's.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnPixels {
+    /// Its first row's mask.
+    pub first_row: u32,
+    /// What its rectangle's first pixel has.
+    pub first_pixel: u32,
 }
 
 /// A cell of a triangle's barycentric grid.
@@ -153,7 +162,7 @@ pub fn patches(
                 rect: extent.rect,
                 pixels: extent.pixels,
                 cell: None,
-                rows: None,
+                own: None,
             });
         } else {
             let grid = Grid::new(eye, corners(triangle), extent.pixels);
@@ -221,7 +230,7 @@ fn cells(
             rect: extent.rect,
             pixels: extent.pixels,
             cell: Some(Cell { grid, index }),
-            rows: None,
+            own: None,
         });
     }
 }

@@ -81,7 +81,7 @@ fn of_patch(
     for y in patch.rect.min[1]..patch.rect.max[1] {
         for x in patch.rect.min[0]..patch.rect.max[0] {
             let pixel = (y * width + x) as usize;
-            let own = patch.owns(visibility, &pass.rows, x, y);
+            let own = patch.owns(visibility, &pass.pixels.rows, x, y);
             let key = keys[pixel];
             if !own || key == EMPTY {
                 continue;

@@ -148,6 +148,9 @@ impl PatchWork<'_> {
             pass.batches.cull(camera, batches);
             counters.cull_ns += nanoseconds(start, Instant::now());
             counters.batches += batches.len() as u64;
+            if std::env::var_os("CELLR").is_some() {
+                eprintln!("R {} {} {} {} {} {}", patch.pixels, patch.rect.width(), patch.rect.height(), batches.iter().map(|b| b.count).sum::<u32>(), batches.len(), camera.object);
+            }
             let work = Projection { pass, surfels, camera, patch, stride };
             let shared = Shared { work, visibility, level, pool };
             counters = counters.plus(shared.project(batches, packed, hits, tile));
@@ -308,7 +311,7 @@ fn fill_tile(tile: &mut Vec<u64>, pass: &SplatPass<'_>, patch: &Patch, visibilit
     for y in patch.rect.min[1]..patch.rect.max[1] {
         let row = (y - patch.rect.min[1]) as usize * side + BORDER as usize;
         for x in patch.rect.min[0]..patch.rect.max[0] {
-            if patch.owns(visibility, &pass.rows, x, y) {
+            if patch.owns(visibility, &pass.pixels.rows, x, y) {
                 let at = row * stride + (x - patch.rect.min[0]) as usize * side + BORDER as usize;
                 for j in 0..side {
                     tile[at + j * stride..at + j * stride + side].fill(EMPTY);

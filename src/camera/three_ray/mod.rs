@@ -20,13 +20,13 @@ pub use super::mirror_ray::RayScale;
 pub use project::{Image, project};
 pub use volume::{BoxTest, Boxes, Verdict, ViewVolume};
 
-/// The three construction rays, in f64.
+/// The three construction rays, in f64, or those at the corners of a polygon of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rays {
+pub struct Rays<const N: usize = 3> {
     /// Where they start: the triangle.
-    pub origins: [DVec3; 3],
+    pub origins: [DVec3; N],
     /// Their directions; the lengths matter, see [`RayScale`].
-    pub directions: [DVec3; 3],
+    pub directions: [DVec3; N],
 }
 
 impl Rays {
@@ -36,11 +36,11 @@ impl Rays {
         (mix(&self.origins), mix(&self.directions))
     }
 
-    /// The camera of the part of the triangle with these corners (barycentrics): the same rays, since v and d
-    /// are linear in w.
-    pub fn part(&self, corners: [DVec3; 3]) -> Self {
+    /// The rays of the part of the triangle's plane with these corners (barycentrics). A triangle's make the same camera,
+    /// since v and d are linear in w.
+    pub fn part<const N: usize>(&self, corners: [DVec3; N]) -> Rays<N> {
         let rays = corners.map(|w| self.at(w));
-        Self { origins: rays.map(|r| r.0), directions: rays.map(|r| r.1) }
+        Rays { origins: rays.map(|r| r.0), directions: rays.map(|r| r.1) }
     }
 
     /// The camera whose triangle is {w_i ≥ -margin_i}: it contains the guard band.
@@ -52,7 +52,9 @@ impl Rays {
             DVec3::new(-m.x, -m.y, 1.0 + m.x + m.y),
         ])
     }
+}
 
+impl<const N: usize> Rays<N> {
     /// Mean direction, unit; `None` if the directions cancel.
     pub fn axis(&self) -> Option<DVec3> {
         let unit = |d: DVec3| d.try_normalize().unwrap_or(DVec3::ZERO);
@@ -85,10 +87,10 @@ pub struct ThreeRay<T> {
     pub nd: [T; 3],
     /// Unit mean direction: λ lies between the least and largest (axis·q - start_i)·per_axis_i.
     pub axis: [T; 3],
-    /// axis·(v_i - v1), v_i of the grown triangle.
-    pub start: [T; 3],
+    /// axis·(v_i - v1), v_i the corners of the grown camera; a triangle's last one twice.
+    pub start: [T; 4],
     /// 1 / axis·d_i; not used if `wide`.
-    pub per_axis: [T; 3],
+    pub per_axis: [T; 4],
     /// The directions open so wide that the axis bounds nothing.
     pub wide: bool,
 }
@@ -102,15 +104,16 @@ pub(crate) fn array<T: Scalar>(v: DVec3) -> [T; 3] {
 }
 
 impl<T: Scalar> ThreeRay<T> {
-    /// The constants of `rays`; images are looked for within the triangle of `grown` (the same rays, see
-    /// [`Rays::grown`]). Degenerate triangles give a camera that sees nothing.
-    pub fn new(rays: &Rays, grown: &Rays) -> Self {
+    /// The constants of `rays`; images are looked for between the rays of `grown` (the same camera's, see
+    /// [`Rays::grown`] and [`Rays::part`]; three or four). Degenerate triangles give a camera that sees nothing.
+    pub fn new<const N: usize>(rays: &Rays, grown: &Rays<N>) -> Self {
         let ([v1, v2, v3], [d1, d2, d3]) = (rays.origins, rays.directions);
         let (e1, e2, f1, f2) = (v2 - v1, v3 - v1, d2 - d1, d3 - d1);
         let (n0, n1, n2) = (e1.cross(e2), e1.cross(f2) + f1.cross(e2), f1.cross(f2));
         let axis = grown.axis().unwrap_or(DVec3::ZERO);
         let along = grown.directions.map(|d| axis.dot(d));
-        let wide = (0..3).any(|i| along[i] <= WIDE_COSINE * grown.directions[i].length());
+        let wide = (0..N).any(|i| along[i] <= WIDE_COSINE * grown.directions[i].length());
+        let corner = [0, 1, 2, 3].map(|i| i.min(N - 1));
         Self {
             v1: array(v1),
             d1: array(d1),
@@ -123,8 +126,8 @@ impl<T: Scalar> ThreeRay<T> {
             n2: array(n2),
             nd: [n0, n1, n2].map(|n| T::from_f64(n.dot(d1))),
             axis: array(axis),
-            start: grown.origins.map(|v| T::from_f64(axis.dot(v - v1))),
-            per_axis: along.map(|s| T::from_f64(if wide { 0.0 } else { 1.0 / s })),
+            start: corner.map(|i| T::from_f64(axis.dot(grown.origins[i] - v1))),
+            per_axis: corner.map(|i| T::from_f64(if wide { 0.0 } else { 1.0 / along[i] })),
             wide,
         }
     }

@@ -65,9 +65,11 @@ impl<T: Scalar> ThreeRay<T> {
         let x = (along - self.start[0]) * self.per_axis[0];
         let y = (along - self.start[1]) * self.per_axis[1];
         let z = (along - self.start[2]) * self.per_axis[2];
+        let w = (along - self.start[3]) * self.per_axis[3];
         // Outward by far more than the rounding of the bounds.
-        let slack = (x.abs() + y.abs() + z.abs()) * T::from_f64(1e-5);
-        ((x.min(y).min(z) - slack).max(lo), (x.max(y).max(z) + slack).min(hi))
+        let slack = (x.abs() + y.abs() + z.abs() + w.abs()) * T::from_f64(1e-5);
+        let (least, most) = (x.min(y).min(z).min(w), x.max(y).max(z).max(w));
+        ((least - slack).max(lo), (most + slack).min(hi))
     }
 
     /// The image at a root λ of the cubic of `q`.

@@ -35,27 +35,28 @@ pub struct Boxes<R> {
 
 /// A fixed direction along which the sweep is compared with boxes.
 #[derive(Clone, Copy, Debug)]
-struct Direction<T> {
+struct Direction<T, const N: usize> {
     n: [T; 3],
     /// n·(v_i - v1).
-    start: [T; 3],
+    start: [T; N],
     /// n·d_i.
-    speed: [T; 3],
+    speed: [T; N],
     /// 1 / speed where that is not zero.
-    per_speed: [T; 3],
+    per_speed: [T; N],
     /// Largest |start|.
     reach: T,
 }
 
-/// A view volume: the union of T(λ) over a λ range.
+/// A view volume: the union of T(λ) over a λ range, where T(λ) is a triangle or, with more corners, a plane convex
+/// polygon.
 #[derive(Clone, Copy, Debug)]
-pub struct ViewVolume<T> {
+pub struct ViewVolume<T, const N: usize = 3> {
     v1: [T; 3],
-    v: [[T; 3]; 3],
-    d: [[T; 3]; 3],
-    axes: [Direction<T>; 3],
-    axis: Direction<T>,
-    walls: [Direction<T>; 3],
+    v: [[T; 3]; N],
+    d: [[T; 3]; N],
+    axes: [Direction<T, N>; 3],
+    axis: Direction<T, N>,
+    walls: [Direction<T, N>; N],
 }
 
 /// What a test says of boxes.
@@ -84,8 +85,8 @@ const ROUNDING: f64 = 1e-6;
 /// Where the fixed walls of the sweep test touch the volume, as λ (untuned).
 const WALL_LAMBDA: f64 = 1.0;
 
-impl<T: Scalar> Direction<T> {
-    fn new(n: DVec3, rays: &Rays) -> Self {
+impl<T: Scalar, const N: usize> Direction<T, N> {
+    fn new(n: DVec3, rays: &Rays<N>) -> Self {
         // The rounded direction is the one that is compared with, so its products are made from it.
         let n: [T; 3] = array(n);
         let exact = DVec3::from_array(n.map(T::to_f64));
@@ -119,7 +120,7 @@ impl<T: Scalar> Direction<T> {
             // T(λ) is beyond the box where ±(start_i + λ speed_i) > ±edge for all i: an interval of λ.
             let edge = if above { middle + half } else { middle - half };
             let (mut from, mut to) = (-far, far);
-            for i in 0..3 {
+            for i in 0..N {
                 let speed = if above { self.speed[i] } else { -self.speed[i] };
                 let at = (edge - self.start[i]) * self.per_speed[i];
                 if speed > zero {
@@ -147,9 +148,9 @@ fn abs<T: Scalar>(x: T) -> T {
     if x < T::from_f64(0.0) { -x } else { x }
 }
 
-impl<T: Scalar> ViewVolume<T> {
+impl<T: Scalar, const N: usize> ViewVolume<T, N> {
     /// The volume of the grown camera `rays`. Boxes are given relative to [`ViewVolume::origin`].
-    pub fn new(rays: &Rays) -> Self {
+    pub fn new(rays: &Rays<N>) -> Self {
         let v1 = rays.origins[0];
         let axis = rays.axis().unwrap_or(DVec3::ZERO);
         let wall = |i: usize, j: usize| {
@@ -163,7 +164,7 @@ impl<T: Scalar> ViewVolume<T> {
             d: rays.directions.map(array),
             axes: [DVec3::X, DVec3::Y, DVec3::Z].map(|n| Direction::new(n, rays)),
             axis: Direction::new(axis, rays),
-            walls: [(0, 1), (1, 2), (2, 0)].map(|(i, j)| Direction::new(wall(i, j), rays)),
+            walls: std::array::from_fn(|i| Direction::new(wall(i, (i + 1) % N), rays)),
         }
     }
 
@@ -187,7 +188,15 @@ impl<T: Scalar> ViewVolume<T> {
             BoxTest::Sweep => self.sweep(boxes, lo, hi, true),
             BoxTest::Slab => self.slab(boxes, lo, hi),
             BoxTest::Paper => {
-                let (lo, hi, meets) = super::paper_test::meets(&self.v, &self.d, boxes, lo, hi);
+                // Stated for triangles: others are not tested.
+                let (Some(v), Some(d)) = (self.v.first_chunk::<3>(), self.d.first_chunk::<3>())
+                else {
+                    return Verdict::not_inside(lo, hi, lo.le(hi));
+                };
+                if N > 3 {
+                    return Verdict::not_inside(lo, hi, lo.le(hi));
+                }
+                let (lo, hi, meets) = super::paper_test::meets(v, d, boxes, lo, hi);
                 Verdict::not_inside(lo, hi, meets)
             }
         }
@@ -221,14 +230,18 @@ impl<T: Scalar> ViewVolume<T> {
         let (lo, hi) = self.axis.trim(boxes, lo, hi);
         let share = T::from_f64(ROUNDING);
         let mut alive = lo.le(hi);
-        let near = [self.corner(0, lo), self.corner(1, lo), self.corner(2, lo)];
-        let far = [self.corner(0, hi), self.corner(1, hi), self.corner(2, hi)];
+        let (mut near, mut far) = ([[lo; 3]; N], [[hi; 3]; N]);
+        for i in 0..N {
+            near[i] = self.corner(i, lo);
+            far[i] = self.corner(i, hi);
+        }
         let mut size = lo.splat(T::from_f64(0.0));
         for k in 0..3 {
-            let low = near[0][k].min(near[1][k]).min(near[2][k]);
-            let low = low.min(far[0][k]).min(far[1][k]).min(far[2][k]);
-            let high = near[0][k].max(near[1][k]).max(near[2][k]);
-            let high = high.max(far[0][k]).max(far[1][k]).max(far[2][k]);
+            let (mut low, mut high) = (near[0][k].min(far[0][k]), near[0][k].max(far[0][k]));
+            for i in 1..N {
+                low = low.min(near[i][k]).min(far[i][k]);
+                high = high.max(near[i][k]).max(far[i][k]);
+            }
             let (c, h) = (boxes.center[k], boxes.half[k]);
             let margin = (c.abs() + h + low.abs().max(high.abs())) * share;
             size = size + margin;
@@ -239,8 +252,12 @@ impl<T: Scalar> ViewVolume<T> {
         }
         let mut inside = alive;
         let mid = (lo + hi) * T::from_f64(0.5);
-        let at_mid = [self.corner(0, mid), self.corner(1, mid), self.corner(2, mid)];
-        for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+        let mut at_mid = [[mid; 3]; N];
+        for i in 0..N {
+            at_mid[i] = self.corner(i, mid);
+        }
+        for i in 0..N {
+            let j = (i + 1) % N;
             let along = [
                 mid.splat(self.d[i][0] + self.d[j][0]),
                 mid.splat(self.d[i][1] + self.d[j][1]),
@@ -252,12 +269,19 @@ impl<T: Scalar> ViewVolume<T> {
                 at_mid[j][2] - at_mid[i][2],
             ];
             let n = cross(edge, along);
-            let p = [dot(near[0], n), dot(near[1], n), dot(near[2], n)];
-            let q = [dot(far[0], n), dot(far[1], n), dot(far[2], n)];
+            let (mut p, mut q) = ([lo; N], [hi; N]);
+            for k in 0..N {
+                p[k] = dot(near[k], n);
+                q[k] = dot(far[k], n);
+            }
             let wall_high = p[i].max(p[j]).max(q[i]).max(q[j]);
             let wall_low = p[i].min(p[j]).min(q[i]).min(q[j]);
-            let high = wall_high.max(p[k]).max(q[k]);
-            let low = wall_low.min(p[k]).min(q[k]);
+            let (mut high, mut low) = (wall_high, wall_low);
+            for other in 2..N {
+                let k = (i + other) % N;
+                high = high.max(p[k]).max(q[k]);
+                low = low.min(p[k]).min(q[k]);
+            }
             let sizes = [n[0].abs(), n[1].abs(), n[2].abs()];
             let half = dot(boxes.half, sizes);
             // Every term is at most `size / share` times the normal's largest component.
@@ -266,6 +290,8 @@ impl<T: Scalar> ViewVolume<T> {
             // Refused only where the comparison holds: a NaN from an overflow refuses nothing.
             let outside = (high + margin).lt(middle - half) | (middle + half).lt(low - margin);
             alive = alive & !outside;
+            // The last corner before the wall is on the inner side.
+            let k = (i + N - 1) % N;
             let upward = (p[i] + q[i]).lt(p[k] + q[k]);
             let above = upward & wall_high.le(middle - half);
             inside = inside & (above | (!upward & (middle + half).le(wall_low)));

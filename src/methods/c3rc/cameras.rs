@@ -5,9 +5,8 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::super::FrameInput;
-use super::cells::CellRays;
 use super::footprint::Footprint;
-use super::guard::{self, Guard, MAX_GUARD, Reach};
+use super::guard::{self, Guard, MAX_GUARD, Outline, Reach};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
 use crate::camera::RayScale;
@@ -16,7 +15,7 @@ use crate::camera::three_ray::{BoxTest, Rays, ThreeRay, ViewVolume, array};
 use crate::cull::test_children;
 use crate::geometry::Similarity;
 use crate::geometry::lanes::simd_level;
-use crate::plan::{CameraInstance, Gaze, SplatShape};
+use crate::plan::{CameraInstance, Gaze, SplatShape, Volume};
 use crate::scene::prepared::{PreparedObject, PreparedScene};
 use crate::visibility::Patch;
 
@@ -29,6 +28,8 @@ const SHORTENING: f64 = 1e3;
 const EVENNESS: f64 = 1.5;
 /// No camera has more than so many times the detail that was asked for (untuned).
 const MOST_DETAIL: f64 = 64.0;
+/// A cell's camera is so many pixels beside the exact rays at most.
+pub(super) const CELL_SLACK_PX: f64 = super::cells::TOLERANCE_PX as f64;
 /// For the rounding of a gaze's cosine.
 const GAZE_SLACK: f64 = 1e-5;
 
@@ -54,7 +55,6 @@ impl CameraSettings {
 pub(super) fn cameras(
     frame: FrameInput<'_>,
     patches: &[Patch],
-    cells: Option<&[CellRays]>,
     settings: CameraSettings,
 ) -> (Vec<CameraInstance>, Vec<u32>) {
     let top = Top::new(frame.scene, frame.eye);
@@ -65,33 +65,61 @@ pub(super) fn cameras(
             let mut list = Vec::new();
             for (i, patch) in patches.iter().enumerate() {
                 let index = u32::try_from(chunk * 32 + i).expect("fewer patches than pixels");
-                let cell = cells.map(|cells| &cells[index as usize]);
-                of_patch(frame, &top, patch, cell, index, settings, &mut list);
+                let view = of_triangle(frame, patch, settings.ray_scale);
+                of_view(frame, &top, &view, index, settings, &mut list);
             }
             list
         })
         .collect();
     let cameras: Vec<CameraInstance> = lists.concat();
-    let mut starts = vec![0u32; patches.len() + 1];
-    for camera in &cameras {
-        starts[camera.patch as usize + 1] += 1;
-    }
-    for i in 0..patches.len() {
-        starts[i + 1] += starts[i];
-    }
+    let starts = starts(&cameras, patches.len());
     (cameras, starts)
 }
 
+/// Where each patch's cameras begin.
+pub(super) fn starts(cameras: &[CameraInstance], patches: usize) -> Vec<u32> {
+    let mut starts = vec![0u32; patches + 1];
+    for camera in cameras {
+        starts[camera.patch as usize + 1] += 1;
+    }
+    for i in 0..patches {
+        starts[i + 1] += starts[i];
+    }
+    starts
+}
+
+/// A patch and its rays, scene space.
+pub(super) struct View<'a> {
+    pub(super) patch: &'a Patch,
+    pub(super) rays: Rays,
+    /// Positive where a corner's ray leaves the mirror on its front side.
+    pub(super) front: [f64; 3],
+    /// Of a cell: what holds its pixels, and how far beyond it its rays may be continued, in pixels.
+    pub(super) outline: Option<(Outline, f64)>,
+}
+
+fn of_triangle<'a>(frame: FrameInput<'_>, patch: &'a Patch, scale: RayScale) -> View<'a> {
+    let position = frame.eye.position;
+    let mirror = frame.scene.mirror_triangle(patch.triangle.0);
+    let whole = Rays {
+        origins: mirror.corners.map(|v| v.as_dvec3()),
+        directions: mirror.corner_directions(position, scale),
+    };
+    let facing = DVec3::from_array(mirror.facing(position));
+    let front = patch.corners.map(|w| w.dot(facing));
+    View { patch, rays: whole.part(patch.corners), front, outline: None }
+}
+
 /// The objects' boxes in scene space, eight at a time.
-struct Top {
+pub(super) struct Top {
     groups: Vec<WideNode>,
     /// No object is farther from the eye than this.
     reach: f64,
-    level: Level,
+    pub(super) level: Level,
 }
 
 impl Top {
-    fn new(scene: &PreparedScene, eye: &Eye) -> Self {
+    pub(super) fn new(scene: &PreparedScene, eye: &Eye) -> Self {
         let mut reach = 0.0f64;
         let groups = scene
             .objects
@@ -111,40 +139,33 @@ impl Top {
     }
 }
 
-fn of_patch(
+/// Appends the cameras of one view: one for each object that it may see.
+pub(super) fn of_view(
     frame: FrameInput<'_>,
     top: &Top,
-    patch: &Patch,
-    cell: Option<&CellRays>,
+    view: &View<'_>,
     index: u32,
     settings: CameraSettings,
     out: &mut Vec<CameraInstance>,
 ) {
     let FrameInput { scene, eye, visibility } = frame;
-    let (rays, front) = match cell {
-        Some(cell) => (cell.rays, [1.0; 3]),
-        None => {
-            let mirror = scene.mirror_triangle(patch.triangle.0);
-            let whole = Rays {
-                origins: mirror.corners.map(|v| v.as_dvec3()),
-                directions: mirror.corner_directions(eye.position, settings.ray_scale),
-            };
-            let facing = DVec3::from_array(mirror.facing(eye.position));
-            (whole.part(patch.corners), patch.corners.map(|w| w.dot(facing)))
-        }
-    };
+    let View { patch, rays, front, outline } = view;
     let [v1, v2, v3] = rays.origins;
     if (v2 - v1).cross(v3 - v1) == DVec3::ZERO {
         return;
     }
     let position = eye.position.as_dvec3();
     let corners_px = rays.origins.map(|v| homogeneous(eye, v));
-    let around = match cell {
-        Some(_) => guard::around_rect(&corners_px, patch, settings.reach()),
-        None => guard::around(&corners_px, patch, settings.reach()),
+    let reach = settings.reach();
+    let grown_px = |outline: &Outline, most: f64, splat_px: f64| {
+        let px = reach.samples + splat_px.min(reach.splat).min(most) + CELL_SLACK_PX;
+        Grown::Four(guard::weights_of(&corners_px, outline.grown(px)))
     };
-    let around = rays.grown(around);
-    let volume = ViewVolume::<f32>::new(&around);
+    let around = match outline {
+        Some((outline, most)) => grown_px(outline, *most, reach.splat),
+        None => Grown::Three(guard::around(&corners_px, patch, reach)),
+    };
+    let volume = around.volume(rays);
     let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
     let size = rays.origins.map(|v| (v - position).length());
     let farthest = size.iter().fold(0.0, |m: f64, &s| m.max(s));
@@ -157,56 +178,64 @@ fn of_patch(
     let mut exact = None;
     let samples = f64::from(settings.samples);
     for (g, group) in top.groups.iter().enumerate() {
-        let tested = dispatch!(top.level, simd => test_children(simd, group, &volume, BoxTest::Slab, lambda));
+        let tested = match &volume {
+            Volume::Three(volume) => {
+                dispatch!(top.level, simd => test_children(simd, group, volume, BoxTest::Slab, lambda))
+            }
+            Volume::Four(volume) => {
+                dispatch!(top.level, simd => test_children(simd, group, volume, BoxTest::Slab, lambda))
+            }
+        };
         let mut bits = tested.meets & group.used;
         while bits != 0 {
             let slot = bits.trailing_zeros() as usize;
             bits &= bits - 1;
             let object = g * CHILDREN + slot;
             let to_scene = &scene.objects[object].to_scene;
-            let own = rays_in(to_scene, &rays);
             let range = [tested.lo[slot], tested.hi[slot]];
-            let radius = EVENNESS * f64::from(scene.objects[object].extent);
-            let (front, screen, guard) = exact.get_or_insert_with(|| {
+            let range_f64 = range.map(f64::from);
+            let radius = EVENNESS * to_scene.scale * f64::from(scene.objects[object].extent);
+            let (screen, guard, footprint) = exact.get_or_insert_with(|| {
                 let screen = screen_forms(eye, patch, rays.origins, samples);
-                let guard = match cell {
-                    Some(_) => Guard::of_rect(&corners_px, patch, settings.reach()),
-                    None => Guard::new(&corners_px, visibility, patch, settings.reach()),
+                let guard = match outline {
+                    Some(_) => None,
+                    None => Some(Guard::new(&corners_px, visibility, patch, reach)),
                 };
-                (linear_form(front), screen, guard)
+                let before = corners_px.iter().all(|c| c.z > 0.0);
+                let px = |c: DVec3| if before { c.truncate() / c.z } else { DVec2::NAN };
+                (screen, guard, Footprint::new(&corners_px.map(px), rays))
             });
-            let before = corners_px.iter().all(|c| c.z > 0.0);
-            let seen_px = corners_px.map(|c| if before { c.truncate() / c.z } else { DVec2::NAN });
-            let footprint = Footprint::new(&seen_px, &own);
-            let detail = match cell {
+            let detail = match outline {
                 Some(_) => settings.detail,
-                None => {
-                    own_detail(settings.detail, &corners_px, &footprint, range.map(f64::from))
-                }
+                None => own_detail(settings.detail, &corners_px, footprint, range_f64),
             };
             // A representative's disk has the area of a share of a pixel.
             let holds = |lambda: f64| {
                 let area = if detail > 0.0 { footprint.area_per_px(lambda) / detail } else { 0.0 };
                 radius.max(EVENNESS * (area / std::f64::consts::PI).sqrt())
             };
+            let splat_px = guard::splat_px(holds, footprint, range_f64);
+            let grown = match (guard, outline) {
+                (None, Some((outline, most))) => grown_px(outline, *most, splat_px),
+                (Some(guard), _) => Grown::Three(guard.margins(splat_px)),
+                (None, None) => unreachable!("triangles have guards"),
+            };
             if std::env::var_os("CELLR").is_some() {
-                let r = [range[0], 0.5*(range[0]+range[1]), range[1]].map(|l| holds(l.into()) * footprint.px_per_unit(l.into()));
-                eprintln!("R {} {:?} {:?}", patch.pixels, r, range);
+                eprintln!("S {} {} {} {:.2}", patch.pixels, patch.rect.width(), patch.rect.height(), splat_px);
             }
-            let guard = guard.holding(holds, &footprint, range.map(f64::from));
-            let own_grown = own.grown(guard);
-            let several = mixed_sign_range(&own_grown, range[0].into(), range[1].into());
-            let from_eye =
-                rays.origins.map(|v| to_scene.inverse_direction(v - position) / to_scene.scale);
+            let own = rays_in(to_scene, rays);
+            let own_grown = grown.triangle(&own);
+            let several = mixed_sign_range(&own_grown, range_f64[0], range_f64[1]);
+            let from_eye = rays.origins.map(|v| v - position);
             #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
             out.push(CameraInstance {
                 patch: index,
                 object: u32::try_from(object).expect("fewer than 2^32 objects"),
-                camera: ThreeRay::new(&own, &own_grown),
-                volume: ViewVolume::new(&own_grown),
+                camera: grown.camera(&own),
+                volume: grown.volume(&own),
                 lambda: range,
                 several: several.map_or([1.0, 0.0], |(a, b)| [a as f32, b as f32]),
-                scale: to_scene.scale as f32,
+                direction: [0, 1, 2].map(|k| linear_form(rays.directions.map(|d| d[k]))),
                 screen: *screen,
                 per_sample: [footprint.base, footprint.per_lambda]
                     .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / (radius * samples)))),
@@ -215,11 +244,57 @@ fn of_patch(
                 detail: detail as f32,
                 radius: radius as f32,
                 extent: scene.objects[object].extent,
-                footprint: footprint.quadratics().map(|q| q.map(|x| x as f32)),
-                guard: array(guard),
-                front: *front,
+                footprint: {
+                    // In the object's space, where the culling is.
+                    let per_unit = to_scene.scale.powi(-2);
+                    footprint.quadratics().map(|q| q.map(|x| (x * per_unit) as f32))
+                },
+                guard: grown.guard(),
+                front: linear_form(*front),
                 from_eye: [0, 1, 2].map(|k| linear_form(from_eye.map(|v| v[k]))),
             });
+        }
+    }
+}
+
+/// What a camera has to see, beyond its patch's own pixels.
+enum Grown {
+    /// The margins of a triangle's weights.
+    Three(DVec3),
+    /// The weights of the corners of a rectangle on the screen.
+    Four([DVec3; 4]),
+}
+
+impl Grown {
+    fn volume(&self, rays: &Rays) -> Volume {
+        match self {
+            Self::Three(margins) => Volume::Three(ViewVolume::new(&rays.grown(*margins))),
+            Self::Four(corners) => Volume::Four(ViewVolume::new(&rays.part(*corners))),
+        }
+    }
+
+    fn camera(&self, rays: &Rays) -> ThreeRay<f32> {
+        match self {
+            Self::Three(margins) => ThreeRay::new(rays, &rays.grown(*margins)),
+            Self::Four(corners) => ThreeRay::new(rays, &rays.part(*corners)),
+        }
+    }
+
+    /// A triangle that holds it.
+    fn triangle(&self, rays: &Rays) -> Rays {
+        match self {
+            Self::Three(margins) => rays.grown(*margins),
+            Self::Four(corners) => {
+                rays.grown(-corners.iter().copied().fold(DVec3::INFINITY, DVec3::min))
+            }
+        }
+    }
+
+    /// How far outside the triangle images are drawn; where the screen's rectangle decides: everywhere.
+    fn guard(&self) -> [f32; 3] {
+        match self {
+            Self::Three(margins) => array(*margins),
+            Self::Four(_) => [f32::MAX; 3],
         }
     }
 }

@@ -5,51 +5,57 @@
 mod field;
 mod fit;
 
+use fearless_simd::dispatch;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::field::{Linear, RayField, centre};
-use self::fit::{BASE, Judge, Mask, Sums};
+use self::fit::{Judge, Mask, Sums};
 use super::super::FrameInput;
+use super::cameras::{CameraSettings, Top, View, of_view, starts};
+use super::guard::Outline;
+use crate::camera::Eye;
 use crate::camera::three_ray::{RayScale, Rays};
-use crate::visibility::{MirrorTriangleIndex, Patch, PixelRect};
+use crate::plan::{CameraInstance, Pixels};
+use crate::visibility::{MirrorTriangleIndex, OwnPixels, Patch, PixelRect};
 
 /// Columns and rows of a tile: the largest cell. A row is a word of bits.
 const TILE: usize = 32;
 /// How far a ray of a cell may lie from its camera's, in pixels (untuned).
-const TOLERANCE_PX: f32 = 0.25;
-/// The same at the mirror's surface.
-const SURFACE_TOLERANCE_PX: f32 = 2.0;
-/// Squares of a tile along a side.
-const SQUARES: usize = TILE / BASE;
+pub(super) const TOLERANCE_PX: f32 = 1.0;
+/// How much farther a ray may lie while its cell grows (untuned).
+const GROWING: f32 = 1.5;
+/// How much farther the exact rays of other pixels may lie to go on from those of a cell (untuned).
+const NEIGHBOURS: f32 = 4.0;
+/// How often a cell's function is fitted.
+const ROUNDS: usize = 4;
 
-/// The construction rays of a cell, from the corners of a triangle in the picture.
-pub(super) struct CellRays {
-    pub(super) corners_px: [DVec2; 3],
-    pub(super) rays: Rays,
-}
-
-/// All cells of a frame.
+/// Some cells of a frame that see objects.
 #[derive(Default)]
-pub(super) struct Cells {
-    pub(super) patches: Vec<Patch>,
-    /// By patch.
-    pub(super) rays: Vec<CellRays>,
-    /// By patch and row: which pixels are its own.
-    pub(super) rows: Vec<u32>,
+struct Cells {
+    patches: Vec<Patch>,
+    pixels: Pixels,
+    cameras: Vec<CameraInstance>,
 }
 
 /// A cell in its tile.
 struct Group {
-    rows: [u32; TILE],
+    rows: Mask,
+    /// Its own and other pixels whose exact rays go on from its own.
+    known: Mask,
     linear: Linear<4>,
 }
 
-pub(super) fn cells(frame: FrameInput<'_>, scale: RayScale) -> Cells {
+/// All cells that see objects, and their cameras.
+pub(super) fn cells(
+    frame: FrameInput<'_>,
+    settings: CameraSettings,
+) -> (Vec<Patch>, Pixels, (Vec<CameraInstance>, Vec<u32>)) {
     let size = frame.eye.size;
     let tile = TILE as u32;
     let across = size.width.div_ceil(tile);
     let count = across * size.height.div_ceil(tile);
+    let top = Top::new(frame.scene, frame.eye);
     let parts: Vec<Cells> = (0..count)
         .into_par_iter()
         .fold(
@@ -57,9 +63,9 @@ pub(super) fn cells(frame: FrameInput<'_>, scale: RayScale) -> Cells {
             |(mut field, mut groups, mut cells), i| {
                 let origin = [i % across * tile, i / across * tile];
                 groups.clear();
-                of_tile(frame, origin, &mut field, &mut groups);
+                dispatch!(top.level, _simd => of_tile(frame, origin, &mut field, &mut groups));
                 for group in &groups {
-                    cells.push(frame, origin, &field, group, scale);
+                    cells.push(frame, &top, origin, &field, group, settings);
                 }
                 (field, groups, cells)
             },
@@ -68,220 +74,267 @@ pub(super) fn cells(frame: FrameInput<'_>, scale: RayScale) -> Cells {
         .collect();
     let mut all = Cells::default();
     for part in parts {
-        let rows = u32::try_from(all.rows.len()).expect("fewer rows than pixels");
-        all.patches.extend(part.patches.into_iter().map(|mut patch| {
-            patch.rows = patch.rows.map(|first| first + rows);
-            patch
-        }));
-        all.rays.extend(part.rays);
-        all.rows.extend(part.rows);
+        all.append(part);
     }
-    all
+    let starts = starts(&all.cameras, all.patches.len());
+    (all.patches, all.pixels, (all.cameras, starts))
 }
 
-/// One square of a tile, or several that became one.
-#[derive(Clone, Copy, Default)]
-struct Square {
-    sums: Sums,
-    linear: Linear<4>,
-    /// All of its pixels are of one cell.
-    whole: bool,
-    empty: bool,
+fn index(count: usize) -> u32 {
+    u32::try_from(count).expect("fewer than pixels")
 }
 
+/// Groups the pixels of a tile: from a seed's tangent grows what one linear function describes.
+#[inline(always)]
 fn of_tile(frame: FrameInput<'_>, origin: [u32; 2], field: &mut RayField, out: &mut Vec<Group>) {
     let shown = field.fill(frame.eye, frame.scene, frame.visibility, origin);
-    let Some(first) = shown.iter().position(|row| *row != 0) else { return };
-    let first = first * TILE + shown[first].trailing_zeros() as usize;
-    let about = [0, 1, 2, 3].map(|k| field.field[k][first]);
+    let mut left = shown;
     let focal_px = frame.eye.focal_px;
-    let mut squares = [Square::default(); SQUARES * SQUARES];
-    let mut masks = [Mask { left: 0, top: 0, bits: [0; BASE] }; SQUARES * SQUARES];
-    for (i, (square, mask)) in squares.iter_mut().zip(&mut masks).enumerate() {
-        *mask = Mask::of(&shown, i % SQUARES * BASE, i / SQUARES * BASE);
-        square.empty = mask.is_empty();
-        square.whole = square.empty;
-        if square.empty {
-            continue;
-        }
-        square.sums = Sums::new(&field.field, about, mask);
-        if let Some(linear) = square.sums.fit(about) {
-            let judge = Judge::new(&linear, mask.middle(), focal_px, TOLERANCE_PX, SURFACE_TOLERANCE_PX);
-            square.linear = linear;
-            square.whole = judge.accepted(&field.field, mask).bits == mask.bits;
-        }
-        if !square.whole {
-            split(frame, origin, field, about, *mask, out);
-        }
-    }
-    merge(&squares, &masks, field, about, focal_px, out);
-}
-
-/// Groups the pixels of a square whose rays one linear function does not describe.
-fn split(
-    frame: FrameInput<'_>,
-    origin: [u32; 2],
-    field: &mut RayField,
-    about: [f32; 4],
-    mut left: Mask,
-    out: &mut Vec<Group>,
-) {
-    let focal_px = frame.eye.focal_px;
-    while !left.is_empty() {
-        let seed = left.first();
-        let at = seed.map(centre);
+    while let Some(seed) = seed(&left) {
+        let at = seed[1] * TILE + seed[0];
+        let about = [field.field[0][at], field.field[1][at], field.field[2][at], field.field[3][at]];
         let tangent = field.tangent(frame.eye, frame.scene, origin, seed);
-        let judge = |linear: &Linear<4>, more: f32| {
-            Judge::new(linear, at, focal_px, TOLERANCE_PX * more, SURFACE_TOLERANCE_PX)
-        };
-        let near = judge(&tangent, 2.0).accepted(&field.field, &left);
-        let refit = Sums::new(&field.field, about, &near).fit(about).and_then(|linear| {
-            let near = judge(&linear, 1.5).accepted(&field.field, &left);
-            near.contains(seed).then_some((linear, near))
-        });
-        let (linear, mut near) = refit.unwrap_or_else(|| {
-            (tangent, judge(&tangent, 1.0).accepted(&field.field, &left))
-        });
-        near.bits[seed[1] - near.top] |= 1 << (seed[0] - near.left);
-        out.push(Group::new(linear, &[near]));
-        left = left.without(&near);
+        let center = [centre(seed[0]), centre(seed[1])];
+        let growing = GROWING * TOLERANCE_PX;
+        let mut linear = tangent;
+        let mut near = Judge::new(&tangent, center, focal_px, growing).accepted(&field.field, &left);
+        for round in 0..ROUNDS {
+            let sums = Sums::new(&field.field, about, &near);
+            let Some(better) = sums.fit(about) else { break };
+            let tolerance = if round + 1 < ROUNDS { growing } else { TOLERANCE_PX };
+            let judge = Judge::new(&better, sums.middle(), focal_px, tolerance);
+            let grown = judge.accepted(&field.field, &left);
+            let same = grown == near;
+            (linear, near) = (better, grown);
+            if same || near == left {
+                break;
+            }
+        }
+        if near[seed[1]] >> seed[0] & 1 == 0 {
+            linear = tangent;
+            near = Judge::new(&tangent, center, focal_px, TOLERANCE_PX).accepted(&field.field, &left);
+            near[seed[1]] |= 1 << seed[0];
+        }
+        for y in 0..TILE {
+            left[y] &= !near[y];
+        }
+        let judge = Judge::new(&linear, center, focal_px, NEIGHBOURS * TOLERANCE_PX);
+        let known = judge.accepted(&field.field, &shown);
+        out.push(Group { rows: near, known, linear });
     }
 }
 
-/// Squares side by side become one cell where one function describes them.
-fn merge(
-    squares: &[Square; SQUARES * SQUARES],
-    masks: &[Mask; SQUARES * SQUARES],
-    field: &RayField,
-    about: [f32; 4],
-    focal_px: f32,
-    out: &mut Vec<Group>,
-) {
-    let join = |parts: &[usize]| -> Option<Linear<4>> {
-        let mut sums = Sums::default();
-        for &i in parts {
-            if !squares[i].whole {
-                return None;
+/// The middle of the longest run of pixels in a row.
+fn seed(mask: &Mask) -> Option<[usize; 2]> {
+    let mut best = (0, 0, 0);
+    for (y, &bits) in mask.iter().enumerate().filter(|(_, bits)| **bits != 0) {
+        let (mut rest, mut from) = (bits, 0);
+        while rest != 0 {
+            let gap = rest.trailing_zeros();
+            let run = (!(rest >> gap)).trailing_zeros().min(32 - gap);
+            if run > best.0 {
+                best = (run, from + gap + run / 2, y);
             }
-            sums = sums.plus(&squares[i].sums);
-        }
-        let linear = sums.fit(about)?;
-        let judge = Judge::new(&linear, sums.middle(), focal_px, TOLERANCE_PX, SURFACE_TOLERANCE_PX);
-        let fits = |&i: &usize| {
-            squares[i].empty || judge.accepted(&field.field, &masks[i]).bits == masks[i].bits
-        };
-        parts.iter().all(fits).then_some(linear)
-    };
-    let mut push = |linear: Linear<4>, parts: &[usize]| {
-        let masks: Vec<Mask> = parts.iter().map(|&i| masks[i]).collect();
-        out.push(Group::new(linear, &masks));
-    };
-    let all: Vec<usize> = (0..SQUARES * SQUARES).collect();
-    if let Some(linear) = join(&all) {
-        push(linear, &all);
-        return;
-    }
-    for corner in [0, 2, 2 * SQUARES, 2 * SQUARES + 2] {
-        let four = [corner, corner + 1, corner + SQUARES, corner + SQUARES + 1];
-        if let Some(linear) = join(&four) {
-            push(linear, &four);
-            continue;
-        }
-        for i in four {
-            if squares[i].whole && !squares[i].empty {
-                push(squares[i].linear, &[i]);
-            }
+            from += gap + run;
+            rest = if gap + run < 32 { rest >> (gap + run) } else { 0 };
         }
     }
-}
-
-impl Group {
-    fn new(linear: Linear<4>, masks: &[Mask]) -> Self {
-        let mut rows = [0; TILE];
-        for mask in masks {
-            for (row, bits) in rows[mask.top..mask.top + BASE].iter_mut().zip(mask.bits) {
-                *row |= u32::from(bits) << mask.left;
-            }
-        }
-        Self { rows, linear }
-    }
+    (best.0 > 0).then_some([best.1 as usize, best.2])
 }
 
 impl Cells {
     fn push(
         &mut self,
         frame: FrameInput<'_>,
-        [left, top]: [u32; 2],
+        top: &Top,
+        origin: [u32; 2],
         field: &RayField,
         group: &Group,
-        scale: RayScale,
+        settings: CameraSettings,
     ) {
         let all = group.rows.iter().fold(0, |all, row| all | row);
         let used = |row: &u32| *row != 0;
         let Some(first) = group.rows.iter().position(used) else { return };
         let last = group.rows.iter().rposition(used).unwrap_or(first);
         let (from, to) = (all.trailing_zeros(), 32 - all.leading_zeros());
-        #[expect(clippy::cast_possible_truncation, reason = "rows of a tile")]
         let rect = PixelRect {
-            min: [left + from, top + first as u32],
-            max: [left + to, top + last as u32 + 1],
+            min: [origin[0] + from, origin[1] + index(first)],
+            max: [origin[0] + to, origin[1] + index(last) + 1],
         };
         let some = first * TILE + group.rows[first].trailing_zeros() as usize;
-        self.patches.push(Patch {
+        let patch = Patch {
             triangle: MirrorTriangleIndex(field.ids[some]),
             corners: [DVec3::X, DVec3::Y, DVec3::Z],
             rect,
             pixels: group.rows.iter().map(|row| row.count_ones()).sum(),
             cell: None,
-            rows: Some(u32::try_from(self.rows.len()).expect("fewer rows than pixels")),
+            own: Some(OwnPixels {
+                first_row: index(self.pixels.rows.len()),
+                first_pixel: index(self.pixels.deviations.len()),
+            }),
+        };
+        let outline = outline(&group.rows, origin);
+        let plane = inverse_depth(&group.linear, origin, &outline);
+        let [a, b, _, c] = outline.grown(0.0);
+        let rays = construction_rays(frame.eye, origin, [a, b, c], &group.linear, plane, settings.ray_scale);
+        let cameras = self.cameras.len();
+        let most = farthest(&group.linear);
+        let view = View { patch: &patch, rays, front: [1.0; 3], outline: Some((outline, most)) };
+        of_view(frame, top, &view, index(self.patches.len()), settings, &mut self.cameras);
+        if std::env::var_os("CELLG").is_some() && origin == [992, 416] {
+            eprintln!("G {:?} px {} {:?} rays {:?} cams {:?}", rect, patch.pixels, group.linear, rays, self.cameras[cameras..].iter().map(|c| (c.lambda, c.several, c.camera.wide)).collect::<Vec<_>>());
+        }
+        if self.cameras.len() == cameras {
+            return;
+        }
+        self.patches.push(patch);
+        self.pixels.rows.extend(group.rows[first..=last].iter().map(|row| row >> from));
+        for y in first..=last {
+            let begin = self.pixels.deviations.len();
+            let mut last_known = [0.0; 3];
+            for x in from as usize..to as usize {
+                if (group.rows[y] | group.known[y]) >> x & 1 != 0 {
+                    let (cx, cy) = (centre(x), centre(y));
+                    let depth = 1.0 / group.linear.get(3, cx, cy).max(f32::MIN_POSITIVE);
+                    last_known = [0, 1, 2].map(|k| {
+                        (field.field[k][y * TILE + x] - group.linear.get(k, cx, cy)) * depth
+                    });
+                    if x > 0 && (group.rows[y] | group.known[y]) << (32 - x) == 0 {
+                        self.pixels.deviations[begin..].fill(last_known);
+                    }
+                }
+                self.pixels.deviations.push(last_known);
+            }
+        }
+    }
+
+    fn append(&mut self, other: Self) {
+        let (patches, rows) = (index(self.patches.len()), index(self.pixels.rows.len()));
+        let pixels = index(self.pixels.deviations.len());
+        let cameras = other.cameras.into_iter().map(|camera| CameraInstance {
+            patch: camera.patch + patches,
+            ..camera
         });
-        self.rows.extend(group.rows[first..=last].iter().map(|row| row >> from));
-        self.rays.push(construction_rays(frame, [left, top], rect, &group.linear, scale));
+        self.cameras.extend(cameras);
+        self.patches.extend(other.patches.into_iter().map(|patch| Patch {
+            own: patch.own.map(|own| OwnPixels {
+                first_row: own.first_row + rows,
+                first_pixel: own.first_pixel + pixels,
+            }),
+            ..patch
+        }));
+        self.pixels.rows.extend(other.pixels.rows);
+        self.pixels.deviations.extend(other.pixels.deviations);
     }
 }
 
 /// How much less than in its middle the inverse depth may be anywhere about a cell.
 const LEAST_INVERSE: f64 = 0.25;
+/// Pixels around a cell in which its camera is used.
+const AROUND_PX: f64 = 24.0;
+
+/// A linear function of picture positions: its value at one and its slope there.
+struct Plane {
+    at: DVec2,
+    value: f64,
+    slope: DVec2,
+}
+
+/// The inverse depth of a cell's rays, made so flat that it stays positive all around the cell.
+fn inverse_depth(linear: &Linear<4>, origin: [u32; 2], outline: &Outline) -> Plane {
+    let at = outline.center;
+    let p = at - middle(origin);
+    let slope = DVec2::new(f64::from(linear.right[3]), f64::from(linear.down[3]));
+    let value = f64::from(linear.at[3]) + slope.dot(p);
+    let around = AROUND_PX + outline.half.element_sum();
+    let share = ((1.0 - LEAST_INVERSE) * value / (slope.length() * around)).min(1.0);
+    Plane { at, value, slope: slope * share }
+}
+
+/// A rectangle along the main direction of the pixels' spread that holds them all.
+fn outline(mask: &Mask, origin: [u32; 2]) -> Outline {
+    let rows = || (0..TILE).filter(|&y| mask[y] != 0);
+    let (mut n, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for row in rows() {
+        let cy = f64::from(centre(row));
+        for i in (0..TILE).filter(|i| mask[row] >> i & 1 != 0) {
+            let cx = f64::from(centre(i));
+            n += 1.0;
+            x += cx;
+            y += cy;
+            xx += cx * cx;
+            xy += cx * cy;
+            yy += cy * cy;
+        }
+    }
+    let (xx, xy, yy) = (xx / n - x * x / (n * n), xy / n - x * y / (n * n), yy / n - y * y / (n * n));
+    // Nearly round ones lie along the rows.
+    let apart = ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt();
+    let along = if apart < 0.3 * (xx + yy) {
+        DVec2::X
+    } else {
+        DVec2::from_angle(0.5 * (2.0 * xy).atan2(xx - yy))
+    };
+    let across = along.perp();
+    let (mut least, mut most) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for row in rows() {
+        let cy = f64::from(centre(row));
+        for i in [mask[row].trailing_zeros(), 31 - mask[row].leading_zeros()] {
+            let p = DVec2::new(f64::from(centre(i as usize)), cy);
+            let at = DVec2::new(p.dot(along), p.dot(across));
+            (least, most) = (least.min(at), most.max(at));
+        }
+    }
+    let mid = 0.5 * (least + most);
+    // Pixels reach half a pixel about their centres, along the rows.
+    let pixel = 0.5 * (along.x.abs() + along.y.abs());
+    Outline {
+        center: middle(origin) + along * mid.x + across * mid.y,
+        along,
+        half: 0.5 * (most - least) + pixel,
+    }
+}
+
+/// How many pixels beyond its own a cell's rays may be continued: they turn by this at most.
+const MOST_TURN: f64 = 0.5;
+
+fn farthest(linear: &Linear<4>) -> f64 {
+    let [r0, r1, r2, _] = linear.right.map(f64::from);
+    let [b0, b1, b2, _] = linear.down.map(f64::from);
+    let steepest = (DVec3::new(r0, r1, r2).length_squared() + DVec3::new(b0, b1, b2).length_squared()).sqrt();
+    (MOST_TURN / steepest).max(1.0)
+}
+
+fn middle(origin: [u32; 2]) -> DVec2 {
+    DVec2::from_array(origin.map(f64::from)) + 0.5 * TILE as f64
+}
 
 fn construction_rays(
-    frame: FrameInput<'_>,
-    [left, top]: [u32; 2],
-    rect: PixelRect,
+    eye: &Eye,
+    origin: [u32; 2],
+    corners_px: [DVec2; 3],
     linear: &Linear<4>,
+    inverse: Plane,
     scale: RayScale,
-) -> CellRays {
-    let eye = frame.eye;
-    let [x0, y0] = rect.min.map(f64::from);
-    let [x1, y1] = rect.max.map(f64::from);
-    let corners_px = [DVec2::new(x0, y0), DVec2::new(x1, y0), DVec2::new(x0, y1)];
-    let half = 0.5 * TILE as f64;
-    let middle = DVec2::new(f64::from(left) + half, f64::from(top) + half);
-    let at = |k: usize, px: DVec2| {
-        let p = px - middle;
+) -> Rays {
+    let middle = middle(origin);
+    let at = |k: usize, p: DVec2| {
         f64::from(linear.at[k]) + p.x * f64::from(linear.right[k]) + p.y * f64::from(linear.down[k])
     };
     let position = eye.position.as_dvec3();
     let (right, up, forward) = (eye.right.as_dvec3(), eye.up.as_dvec3(), eye.forward.as_dvec3());
     let focal = f64::from(eye.focal_px);
     let (cx, cy) = (0.5 * f64::from(eye.size.width), 0.5 * f64::from(eye.size.height));
-    // Far outside the cell the inverse depth must stay positive: the slope is limited.
-    let center = 0.5 * (DVec2::new(x0, y0) + DVec2::new(x1, y1));
-    let inverse = at(3, center);
-    let slope = DVec2::new(f64::from(linear.right[3]), f64::from(linear.down[3]));
-    let around = 24.0 + (x1 - x0) + (y1 - y0);
-    let share = ((1.0 - LEAST_INVERSE) * inverse / (slope.length() * around)).min(1.0);
     let rays = corners_px.map(|px| {
-        let depth = 1.0 / (inverse + share * slope.dot(px - center));
+        let depth = 1.0 / (inverse.value + inverse.slope.dot(px - inverse.at));
         let view = forward + right * ((px.x - cx) / focal) - up * ((px.y - cy) / focal);
-        let direction = DVec3::new(at(0, px), at(1, px), at(2, px));
+        let p = px - middle;
+        let direction = DVec3::new(at(0, p), at(1, p), at(2, p));
         let direction = match scale {
             RayScale::EyeDistance => direction * depth,
             RayScale::Unit => direction.normalize_or_zero(),
         };
         (position + view * depth, direction)
     });
-    CellRays {
-        corners_px,
-        rays: Rays { origins: rays.map(|r| r.0), directions: rays.map(|r| r.1) },
-    }
+    Rays { origins: rays.map(|r| r.0), directions: rays.map(|r| r.1) }
 }

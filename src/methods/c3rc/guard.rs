@@ -1,7 +1,7 @@
 //! The guard band: how far beyond its triangle a camera must look, so that every splat that covers one of its
 //! pixels is projected (a surfel just across an edge is the neighbour's, but its splat covers this pixel too).
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::footprint::Footprint;
 use crate::visibility::{Patch, Visibility};
@@ -9,8 +9,6 @@ use crate::visibility::{Patch, Visibility};
 /// Furthest guard as a weight. Rays are not extrapolated further than this: a triangle much thinner than a
 /// pixel sees many surfels a pixel anyway (untuned).
 pub(super) const MAX_GUARD: f64 = 0.5;
-/// The same for cells, whose rays are linear about them: nearly no bound.
-const FAR_OUT: f64 = 64.0;
 /// Added for the rounding of weights to f32.
 const SLACK: f64 = 1e-3;
 
@@ -44,29 +42,9 @@ impl Guard {
         Self { margins: margins(corners, visibility, patch, reach), reach }
     }
 
-    /// For all pixels of the patch's rectangle.
-    pub(super) fn of_rect(corners: &[DVec3; 3], patch: &Patch, reach: Reach) -> Self {
-        let weights = Weights::new(corners);
-        let margins = STEPS.map(|step| {
-            let least = least_around(&weights, patch, reach.samples + step * reach.splat - 0.5);
-            (DVec3::splat(SLACK) - least).min(DVec3::splat(FAR_OUT))
-        });
-        Self { margins, reach }
-    }
-
-    /// The margins for surfels of which a disk of this radius (by λ) about any point of a surface holds one, seen at λ
-    /// within `range`: nothing is needed from farther outside than one of them must lie from a pixel's centre.
-    pub(super) fn holding(
-        &self,
-        radius: impl Fn(f64) -> f64,
-        footprint: &Footprint,
-        range: [f64; 2],
-    ) -> DVec3 {
-        let [lo, hi] = range;
-        let share = [lo, 0.5 * (lo + hi), hi]
-            .into_iter()
-            .map(|lambda| radius(lambda) * footprint.px_per_unit(lambda) / self.reach.splat)
-            .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
+    /// The margins for splats that lie at most so many pixels from a sample that they cover.
+    pub(super) fn margins(&self, splat_px: f64) -> DVec3 {
+        let share = splat_px / self.reach.splat;
         // The least weight over points that move apart is a concave function of how far they do: the chord is on
         // the safe side. Nothing is found for what is not a number.
         match STEPS.iter().position(|step| share <= *step) {
@@ -78,6 +56,50 @@ impl Guard {
             None => self.margins[STEPS.len() - 1],
         }
     }
+}
+
+/// How far a surfel may be seen from a pixel's sample that it covers, in pixels: a disk of this radius (by λ) about any
+/// point of a surface holds a surfel, seen at λ within `range`.
+pub(super) fn splat_px(
+    radius: impl Fn(f64) -> f64,
+    footprint: &Footprint,
+    [lo, hi]: [f64; 2],
+) -> f64 {
+    [lo, 0.5 * (lo + hi), hi]
+        .into_iter()
+        .map(|lambda| radius(lambda) * footprint.px_per_unit(lambda))
+        .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
+}
+
+/// A rectangle of the picture, in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outline {
+    pub(super) center: DVec2,
+    /// Unit, along the first sides.
+    pub(super) along: DVec2,
+    /// Half the lengths of the sides.
+    pub(super) half: DVec2,
+}
+
+impl Outline {
+    /// Corners of the rectangle that is larger by so many pixels all around, in order.
+    pub(super) fn grown(&self, px: f64) -> [DVec2; 4] {
+        let along = self.along * (self.half.x + px);
+        let across = self.along.perp() * (self.half.y + px);
+        let Self { center, .. } = *self;
+        [
+            center - along - across,
+            center + along - across,
+            center + along + across,
+            center - along + across,
+        ]
+    }
+}
+
+/// The weights of picture positions in a triangle with these corners.
+pub(super) fn weights_of(corners: &[DVec3; 3], px: [DVec2; 4]) -> [DVec3; 4] {
+    let weights = Weights::new(corners);
+    px.map(|px| weights.at(px.x, px.y))
 }
 
 /// tan 22.5°.
@@ -116,21 +138,12 @@ fn margin(least: DVec3) -> DVec3 {
 
 /// Margins that are never less than those of any [`Guard`] of the patch, at once: for what need not be exact.
 pub(super) fn around(corners: &[DVec3; 3], patch: &Patch, reach: Reach) -> DVec3 {
-    margin(least_around(&Weights::new(corners), patch, reach.samples + reach.splat - 0.5))
-}
-
-/// The same for [`Guard::of_rect`].
-pub(super) fn around_rect(corners: &[DVec3; 3], patch: &Patch, reach: Reach) -> DVec3 {
-    let least = least_around(&Weights::new(corners), patch, reach.samples + reach.splat - 0.5);
-    (DVec3::splat(SLACK) - least).min(DVec3::splat(FAR_OUT))
-}
-
-/// The least weights about a patch's rectangle.
-fn least_around(weights: &Weights, patch: &Patch, reach: f64) -> DVec3 {
+    let weights = Weights::new(corners);
+    let reach = reach.samples + reach.splat - 0.5;
     let [left, top] = patch.rect.min.map(|v| f64::from(v) - reach);
     let [right, bottom] = patch.rect.max.map(|v| f64::from(v) + reach);
     let corners = [(left, top), (right, top), (left, bottom), (right, bottom)];
-    corners.into_iter().fold(DVec3::INFINITY, |m, (x, y)| m.min(weights.at(x, y)))
+    margin(corners.into_iter().fold(DVec3::INFINITY, |m, (x, y)| m.min(weights.at(x, y))))
 }
 
 /// Barycentrics of picture positions.
@@ -170,8 +183,6 @@ fn run(visibility: &Visibility, patch: &Patch, y: u32) -> Option<(u32, u32)> {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec2;
-
     use super::*;
     use crate::camera::eye::ImageSize;
     use crate::camera::three_ray::Rays;
@@ -206,7 +217,7 @@ mod tests {
             rect,
             pixels,
             cell: None,
-            rows: None,
+            own: None,
         };
         (corners, visibility, patch)
     }
@@ -247,7 +258,7 @@ mod tests {
         let origins = px.map(|p| (p * 0.01).extend(0.0));
         let rays = Rays { origins, directions: origins.map(|v| v + DVec3::Z) };
         let footprint = Footprint::new(&px, &rays);
-        let at = |radius: f64| guard.holding(|_| radius, &footprint, [0.5, 1.0]);
+        let at = |radius: f64| guard.margins(splat_px(|_| radius, &footprint, [0.5, 1.0]));
         assert_eq!(at(0.0), guard.margins[0]);
         let radii = [0.001, 0.003, 0.007, 0.012];
         for pair in radii.windows(2) {

@@ -15,7 +15,7 @@ use super::{
 use crate::camera::three_ray::BoxTest;
 use crate::cull::Culler;
 use crate::error::Result;
-use crate::plan::{DepthKey, Pass, Plan, SplatPass, SplatShape};
+use crate::plan::{DepthKey, Pass, Pixels, Plan, SplatPass, SplatShape};
 use crate::scene::prepared::milliseconds;
 use crate::visibility::{MirrorTriangleIndex, PatchScratch, patches};
 
@@ -127,22 +127,15 @@ impl Method for C3rc {
             detail: f64::from(detail),
         };
         let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
-        let cells = (params.choice("cameras") == "cells")
-            .then(|| cells::cells(frame, settings.ray_scale));
-        let (list, rays, rows) = match cells {
-            Some(cells) => (cells.patches, Some(cells.rays), cells.rows),
-            None => {
-                let mut list = Vec::new();
-                let mut scratch = PatchScratch::default();
-                patches(frame.eye, frame.visibility, corners, &mut scratch, &mut list);
-                (list, None, Vec::new())
-            }
+        let (patches, pixels, cameras) = if params.choice("cameras") == "cells" {
+            cells::cells(frame, settings)
+        } else {
+            let mut list = Vec::new();
+            patches(frame.eye, frame.visibility, corners, &mut PatchScratch::default(), &mut list);
+            let cameras = cameras::cameras(frame, &list, settings);
+            (list, Pixels::default(), cameras)
         };
-        if std::env::var_os("CELLT").is_some() { eprintln!("patches {:.2}", milliseconds(start));
-            let mut h = std::collections::BTreeMap::new();
-            for p in &list { let k = p.pixels.ilog2(); let e = h.entry(k).or_insert((0,0)); e.0 += 1; e.1 += p.pixels; }
-            eprintln!("{h:?}"); }
-        let (cameras, patch_cameras) = cameras::cameras(frame, &list, rays.as_deref(), settings);
+        let (cameras, patch_cameras) = cameras;
         out.times.cameras_ms = milliseconds(start);
         let test = match params.choice("test") {
             "none" => BoxTest::None,
@@ -152,8 +145,8 @@ impl Method for C3rc {
             _ => BoxTest::Slab,
         };
         out.passes.push(Pass::Splat(Box::new(SplatPass {
-            patches: list,
-            rows,
+            patches,
+            pixels,
             cameras,
             patch_cameras,
             batches: Box::new(Culler::new(scene, test)),

@@ -22,6 +22,36 @@ fn capped<R: Real<Scalar = f32>>([a, b, c]: [R; 3]) -> ([R; 3], [R; 2]) {
     ([a, b, c], [(c * inverse).sqrt().min(most), (a * inverse).sqrt().min(most)])
 }
 
+/// How the point of the ray that is seen moves, across the ray, with the place on the screen: a sample to the right and
+/// a sample down. In the camera's unit, see [`CameraInstance::per_sample`].
+#[derive(Clone, Copy)]
+struct Frame<R> {
+    right: [R; 3],
+    down: [R; 3],
+}
+
+impl<R: Real<Scalar = f32>> Frame<R> {
+    /// a, b, c: the squared distance a x² + 2 b x y + c y² from the surfel of the ray through a place (x, y) samples
+    /// away, in the surfel's radius.
+    #[inline(always)]
+    fn form(&self, size: R) -> [R; 3] {
+        [
+            dot(self.right, self.right) * size,
+            dot(self.right, self.down) * size,
+            dot(self.down, self.down) * size,
+        ]
+    }
+}
+
+/// A cell's camera is at most about so many pixels beside the exact rays.
+const CELL_SLACK_PX: f32 = 1.0;
+/// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
+const MOST_CORRECTION_PX: f32 = 2.0;
+/// Steps from the camera's image to that of the exact rays.
+const CORRECTIONS: usize = 1;
+/// Of any vector.
+const MOST_LANES: usize = 32;
+
 /// The projection of batches by one camera.
 #[derive(Clone, Copy)]
 pub(crate) struct Projection<'a> {
@@ -53,6 +83,13 @@ impl Projection<'_> {
             SplatShape::Ellipse => LARGEST_ELLIPSE,
             _ => 0.0,
         };
+        // A cell's camera is a little beside the exact rays.
+        let deviations = self.patch.own.map(|own| {
+            let count = (self.patch.rect.width() * self.patch.rect.height()) as usize;
+            let first = own.first_pixel as usize;
+            &self.pass.pixels.deviations[first..first + count]
+        });
+        let beyond = beyond + if deviations.is_some() { CELL_SLACK_PX * self.pass.samples as f32 } else { 0.0 };
         let before = V::broadcast(simd, -beyond);
         let width = V::broadcast(simd, (self.stride - BORDER) as f32 + beyond);
         let rows = self.patch.rect.height() * self.pass.samples;
@@ -85,7 +122,7 @@ impl Projection<'_> {
                 if !V::any(drawn) {
                     continue;
                 }
-                let [x, y, w] = self.place(image, offset);
+                let [mut x, mut y, w] = self.place(image, offset);
                 let mut lands =
                     drawn & zero.lt(w) & before.le(x) & x.lt(width) & before.le(y) & y.lt(height);
                 if !V::any(lands) {
@@ -93,7 +130,14 @@ impl Projection<'_> {
                 }
                 let d = self.direction(image);
                 let depth = self.depth(image, d);
-                let form = self.form(image, d, size);
+                let frame = self.frame(image, d);
+                if let Some(deviations) = deviations {
+                    for _ in 0..CORRECTIONS {
+                        let [dx, dy] = self.correction(simd, deviations, image, &frame, [x, y], offset, lands);
+                        (x, y) = (x + dx, y + dy);
+                    }
+                }
+                let form = frame.form(size);
                 if self.pass.shape == SplatShape::Ellipse {
                     let (form, [wide, high]) = capped(form);
                     lands = lands
@@ -104,8 +148,7 @@ impl Projection<'_> {
                     if !V::any(lands) {
                         continue;
                     }
-                    let rise =
-                        (one / size).sqrt() * (self.camera.radius * self.camera.scale * RISE);
+                    let rise = (one / size).sqrt() * (self.camera.radius * RISE);
                     let values = [x, y, form[0], form[1], form[2], wide, high, rise];
                     for (value, list) in values.into_iter().zip(&mut hits.ellipse) {
                         value.compress(lands, &mut list[len..]);
@@ -126,20 +169,56 @@ impl Projection<'_> {
         valid
     }
 
-    /// a, b, c: the squared distance a x² + 2 b x y + c y² from the surfel of the ray through a place (x, y) samples
-    /// away, in the surfel's radius. `d`: the ray's direction.
+    /// How rays run about the image's. `d`: the image's ray.
     #[inline(always)]
-    fn form<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3], size: R) -> [R; 3] {
+    fn frame<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3]) -> Frame<R> {
         let [base, per_lambda] = self.camera.per_sample;
         let right = along(base[0], per_lambda[0], image.lambda);
         let down = along(base[1], per_lambda[1], image.lambda);
-        let per_length = size.splat(1.0) / dot(d, d);
-        let (right_d, down_d) = (dot(right, d), dot(down, d));
-        [
-            (dot(right, right) - right_d * right_d * per_length) * size,
-            (dot(right, down) - right_d * down_d * per_length) * size,
-            (dot(down, down) - down_d * down_d * per_length) * size,
-        ]
+        let per_length = image.lambda.splat(1.0) / dot(d, d);
+        let (right_d, down_d) = (dot(right, d) * per_length, dot(down, d) * per_length);
+        Frame {
+            right: [0, 1, 2].map(|k| right[k] - right_d * d[k]),
+            down: [0, 1, 2].map(|k| down[k] - down_d * d[k]),
+        }
+    }
+
+    /// From the image at (`x`, `y`) to where the exact ray of that pixel says that it is, in samples.
+    #[inline(always)]
+    fn correction<S: Simd, V: Vector<S>>(
+        &self,
+        simd: S,
+        deviations: &[[f32; 3]],
+        image: &Image<V>,
+        frame: &Frame<V>,
+        [x, y]: [V; 2],
+        offset: f32,
+        lands: V::Mask,
+    ) -> [V; 2] {
+        let zero = V::broadcast(simd, 0.0);
+        let to_px = 1.0 / self.pass.samples as f32;
+        let (width, height) = (self.patch.rect.width() as f32, self.patch.rect.height() as f32);
+        let column = ((x - offset) * to_px).floor().max(zero).min(V::broadcast(simd, width - 1.0));
+        let row = ((y - offset) * to_px).floor().max(zero).min(V::broadcast(simd, height - 1.0));
+        let mut at = [0.0f32; MOST_LANES];
+        V::select(lands, row * width + column, zero).store(&mut at);
+        let mut e = [[0.0f32; MOST_LANES]; 3];
+        for i in 0..V::LANES as usize {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and clamped")]
+            let deviation = deviations[at[i] as usize];
+            for k in 0..3 {
+                e[k][i] = deviation[k];
+            }
+        }
+        let e = [V::load(simd, &e[0]), V::load(simd, &e[1]), V::load(simd, &e[2])];
+        let [a, b, c] = frame.form(V::broadcast(simd, 1.0));
+        let (u, v) = (dot(frame.right, e), dot(frame.down, e));
+        let det = a * c - b * b;
+        let usable = zero.lt(det);
+        let share = image.lambda * (-1.0 / self.camera.radius) / V::select(usable, det, V::broadcast(simd, 1.0));
+        let limit = V::broadcast(simd, MOST_CORRECTION_PX * self.pass.samples as f32);
+        let bounded = |d: V| V::select(usable, d, zero).max(-limit).min(limit);
+        [bounded((u * c - v * b) * share), bounded((v * a - u * b) * share)]
     }
 
     /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first sample
@@ -179,15 +258,10 @@ impl Projection<'_> {
         [x, y, w]
     }
 
-    /// The direction d(w) of the ray.
+    /// The direction d(w) of the ray in scene space.
     #[inline(always)]
     pub(crate) fn direction<R: Real<Scalar = f32>>(&self, image: &Image<R>) -> [R; 3] {
-        let camera = &self.camera.camera;
-        [
-            image.linear([camera.d1[0], camera.f1[0], camera.f2[0]]),
-            image.linear([camera.d1[1], camera.f1[1], camera.f2[1]]),
-            image.linear([camera.d1[2], camera.f1[2], camera.f2[2]]),
-        ]
+        self.camera.direction.map(|form| image.linear(form))
     }
 
     /// The depth key: not negative. `d`: the ray's direction.
@@ -199,6 +273,6 @@ impl Projection<'_> {
             let v = [image.linear(x), image.linear(y), image.linear(z)];
             depth = depth + dot(v, v).sqrt();
         }
-        (depth * self.camera.scale).max(image.lambda.splat(0.0))
+        depth.max(image.lambda.splat(0.0))
     }
 }

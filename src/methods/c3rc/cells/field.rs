@@ -69,6 +69,7 @@ impl RayField {
     }
 
     /// Fills in the tile whose first pixel is (`left`, `top`); returns by row which pixels show a mirror.
+    #[inline(always)]
     pub(super) fn fill(
         &mut self,
         eye: &Eye,
@@ -100,8 +101,8 @@ impl RayField {
             right: right.to_array(),
             down: down.to_array(),
         };
-        for facet in &mut self.facets {
-            facet.id = NONE_ID;
+        for i in 0..FACETS {
+            self.facets[i].id = NONE_ID;
         }
         for y in 0..rows {
             let mut x = 0;
@@ -113,11 +114,11 @@ impl RayField {
                 }
                 if id != NONE_ID {
                     let facet = self.facet(eye, scene, id, middle);
+                    let [a, b, c, q] = &mut self.field;
                     for x in from..x {
                         let ray = reflected(&self.view, &facet, centre(x), centre(y));
-                        for (field, value) in self.field.iter_mut().zip(ray) {
-                            field[y * TILE + x] = value;
-                        }
+                        let i = y * TILE + x;
+                        (a[i], b[i], c[i], q[i]) = (ray[0], ray[1], ray[2], ray[3]);
                     }
                 }
             }

@@ -1,5 +1,7 @@
 //! Linear functions of the picture that describe the rays of some of a tile's pixels.
 
+use glam::Vec3;
+
 use super::TILE;
 use super::field::{AREA, Linear, centre};
 
@@ -21,59 +23,56 @@ pub(super) struct Sums {
 const LEAST_VARIANCE: f64 = 0.3;
 
 impl Sums {
-    /// Over the pixels of `rows` (a bit a pixel) within some columns of the tile. `about`: subtracted from the values.
+    /// Over the pixels of `mask`. `about`: subtracted from the values.
     #[inline(always)]
     pub(super) fn new(field: &[[f32; AREA]; 4], about: [f32; 4], mask: &Mask) -> Self {
         let mut s = Self::default();
-        for y in mask.rows() {
-            let row = mask.bits[y - mask.top];
+        let mut lanes = [[0.0f32; TILE]; 8];
+        for y in 0..TILE {
+            let bits = mask[y];
+            if bits == 0 {
+                continue;
+            }
             let cy = centre(y);
-            let mut m = [0.0f32; BASE];
-            let mut px = [0.0f32; BASE];
-            for i in 0..BASE {
-                m[i] = (row >> i & 1) as f32;
-                px[i] = centre(mask.left + i) * m[i];
+            let (mut count, mut fy) = ([0.0f32; TILE], [[0.0f32; TILE]; 4]);
+            for i in 0..TILE {
+                count[i] = if bits >> i & 1 != 0 { 1.0 } else { 0.0 };
             }
-            let count: f32 = m.iter().sum();
-            let x: f32 = px.iter().sum();
-            s.count += count;
-            s.x += x;
-            s.y += cy * count;
-            for i in 0..BASE {
-                s.xx += px[i] * px[i];
-            }
-            s.xy += cy * x;
-            s.yy += cy * cy * count;
-            let from = y * TILE + mask.left;
             for k in 0..4 {
-                let values = &field[k][from..from + BASE];
-                let (mut f, mut xf) = (0.0, 0.0);
-                for i in 0..BASE {
-                    let value = if m[i] > 0.0 { values[i] - about[k] } else { 0.0 };
-                    f += value;
-                    xf += value * px[i];
+                let values = &field[k][y * TILE..(y + 1) * TILE];
+                for i in 0..TILE {
+                    fy[k][i] = if count[i] > 0.0 { values[i] - about[k] } else { 0.0 };
                 }
-                s.f[k] += f;
-                s.xf[k] += xf;
-                s.yf[k] += cy * f;
+            }
+            // Sums by column; the columns' positions come in at the end.
+            for i in 0..TILE {
+                lanes[0][i] += count[i];
+                lanes[1][i] += count[i] * cy;
+            }
+            let n = bits.count_ones() as f32;
+            s.yy += cy * cy * n;
+            for k in 0..4 {
+                let mut sum = 0.0;
+                for i in 0..TILE {
+                    lanes[2 + k][i] += fy[k][i];
+                    sum += fy[k][i];
+                }
+                s.yf[k] += cy * sum;
+            }
+        }
+        for i in 0..TILE {
+            let cx = centre(i);
+            s.count += lanes[0][i];
+            s.x += cx * lanes[0][i];
+            s.xx += cx * cx * lanes[0][i];
+            s.y += lanes[1][i];
+            s.xy += cx * lanes[1][i];
+            for k in 0..4 {
+                s.f[k] += lanes[2 + k][i];
+                s.xf[k] += cx * lanes[2 + k][i];
             }
         }
         s
-    }
-
-    pub(super) fn plus(&self, o: &Self) -> Self {
-        let four = |a: [f32; 4], b: [f32; 4]| [0, 1, 2, 3].map(|k| a[k] + b[k]);
-        Self {
-            count: self.count + o.count,
-            x: self.x + o.x,
-            y: self.y + o.y,
-            xx: self.xx + o.xx,
-            xy: self.xy + o.xy,
-            yy: self.yy + o.yy,
-            f: four(self.f, o.f),
-            xf: four(self.xf, o.xf),
-            yf: four(self.yf, o.yf),
-        }
     }
 
     /// Mean position.
@@ -109,61 +108,8 @@ impl Sums {
     }
 }
 
-/// Columns and rows of the smallest squares.
-pub(super) const BASE: usize = 8;
-
-/// Some pixels of a square of a tile.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Mask {
-    pub(super) left: usize,
-    pub(super) top: usize,
-    pub(super) bits: [u8; BASE],
-}
-
-impl Mask {
-    #[inline(always)]
-    fn rows(&self) -> std::ops::Range<usize> {
-        self.top..self.top + BASE
-    }
-
-    pub(super) fn of(rows: &[u32; TILE], left: usize, top: usize) -> Self {
-        let mut bits = [0; BASE];
-        for (bits, row) in bits.iter_mut().zip(&rows[top..]) {
-            *bits = row.to_le_bytes()[left / BASE];
-        }
-        Self { left, top, bits }
-    }
-
-    /// Middle of its square, in the tile.
-    pub(super) fn middle(&self) -> [f32; 2] {
-        [self.left, self.top].map(|v| centre(v) - 0.5 + 0.5 * BASE as f32)
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.bits == [0; BASE]
-    }
-
-    pub(super) fn count(&self) -> u32 {
-        u64::from_le_bytes(self.bits).count_ones()
-    }
-
-    pub(super) fn first(&self) -> [usize; 2] {
-        let bit = u64::from_le_bytes(self.bits).trailing_zeros() as usize;
-        [self.left + bit % BASE, self.top + bit / BASE]
-    }
-
-    pub(super) fn without(&self, o: &Self) -> Self {
-        let mut left = *self;
-        for (a, b) in left.bits.iter_mut().zip(o.bits) {
-            *a &= !b;
-        }
-        left
-    }
-
-    pub(super) fn contains(&self, [x, y]: [usize; 2]) -> bool {
-        self.bits[y - self.top] >> (x - self.left) & 1 != 0
-    }
-}
+/// Some pixels of a tile: a bit each, by row.
+pub(super) type Mask = [u32; TILE];
 
 /// How far rays lie from those of a linear function, in pixels.
 pub(super) struct Judge {
@@ -174,43 +120,44 @@ pub(super) struct Judge {
     accepted: f32,
     /// The relative difference of inverse depths that is accepted.
     depth: f32,
+    /// A direction and its least component along which rays are accepted.
+    ahead: [f32; 3],
+    least: f32,
 }
 
+/// The cosine of the largest angle between rays of a cell, twice.
+const AHEAD: f32 = 0.75;
+
+
+/// How far points of the mirror may lie from the linear function's, in pixels (untuned).
+const SURFACE_TOLERANCE_PX: f32 = 2.0;
 /// Where rays change much less across one direction of the picture than across the other, a difference in that
 /// direction counts no more than this share says.
-const FLATTEST: f32 = 0.02;
+const FLATTEST: f32 = 3e-4;
 
 impl Judge {
-    /// `focal_px`: of the eye. `tolerance`, `depth_tolerance`: in pixels, far away and at the mirror.
+    /// About a position in the tile. `focal_px`: of the eye. `tolerance`: in pixels.
     pub(super) fn new(
         linear: &Linear<4>,
         [x, y]: [f32; 2],
         focal_px: f32,
         tolerance: f32,
-        depth_tolerance: f32,
     ) -> Self {
-        let d = [0, 1, 2].map(|k| linear.get(k, x, y));
-        let dd = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        let across = |v: [f32; 4]| {
-            let s = (v[0] * d[0] + v[1] * d[1] + v[2] * d[2]) / dd;
-            [0, 1, 2].map(|k| v[k] - s * d[k])
-        };
-        let (r, b) = (across(linear.right), across(linear.down));
-        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let (mut rr, mut bb, rb) = (dot(r, r), dot(b, b), dot(r, b));
-        let more = (rr + bb) * FLATTEST + f32::MIN_POSITIVE;
-        rr += more;
-        bb += more;
+        let d = Vec3::new(linear.get(0, x, y), linear.get(1, x, y), linear.get(2, x, y));
+        let [r0, r1, r2, _] = linear.right;
+        let [b0, b1, b2, _] = linear.down;
+        let (r, b) = (Vec3::new(r0, r1, r2).reject_from(d), Vec3::new(b0, b1, b2).reject_from(d));
+        let (rr, bb, rb) = (r.length_squared(), b.length_squared(), r.dot(b));
+        let more = (rr + bb) * FLATTEST + (0.1 / focal_px).powi(2);
+        let (rr, bb) = (rr + more, bb + more);
         let det = rr * bb - rb * rb;
-        let to_px = [
-            [0, 1, 2].map(|k| (r[k] * bb - b[k] * rb) / det),
-            [0, 1, 2].map(|k| (b[k] * rr - r[k] * rb) / det),
-        ];
         Self {
             linear: *linear,
-            to_px,
+            to_px: [((r * bb - b * rb) / det).to_array(), ((b * rr - r * rb) / det).to_array()],
             accepted: tolerance * tolerance,
-            depth: depth_tolerance / focal_px,
+            depth: SURFACE_TOLERANCE_PX / focal_px,
+            ahead: d.to_array(),
+            least: AHEAD * d.length_squared(),
         }
     }
 
@@ -218,28 +165,34 @@ impl Judge {
     #[inline(always)]
     pub(super) fn accepted(&self, field: &[[f32; AREA]; 4], mask: &Mask) -> Mask {
         let mut near = *mask;
-        for y in mask.rows() {
+        let l = &self.linear;
+        let [u, v] = &self.to_px;
+        for y in 0..TILE {
+            if near[y] == 0 {
+                continue;
+            }
             let cy = centre(y);
-            let from = y * TILE + mask.left;
-            let [a, b, c, q] = [0, 1, 2, 3].map(|k| &field[k][from..from + BASE]);
-            let l = &self.linear;
-            let mut bits = 0u8;
-            for i in 0..BASE {
-                let x = centre(mask.left + i);
-                let e = [
-                    a[i] - l.get(0, x, cy),
-                    b[i] - l.get(1, x, cy),
-                    c[i] - l.get(2, x, cy),
-                ];
-                let [u, v] = &self.to_px;
+            let row = y * TILE..(y + 1) * TILE;
+            let (a, b) = (&field[0][row.clone()], &field[1][row.clone()]);
+            let (c, q) = (&field[2][row.clone()], &field[3][row]);
+            let mut far = [0.0f32; TILE];
+            for i in 0..TILE {
+                let x = centre(i);
+                let e =
+                    [a[i] - l.get(0, x, cy), b[i] - l.get(1, x, cy), c[i] - l.get(2, x, cy)];
                 let du = u[0] * e[0] + u[1] * e[1] + u[2] * e[2];
                 let dv = v[0] * e[0] + v[1] * e[1] + v[2] * e[2];
                 let inverse = l.get(3, x, cy);
-                let same = (q[i] - inverse).abs() <= inverse * self.depth;
-                let ok = (du * du + dv * dv <= self.accepted) & same;
-                bits |= u8::from(ok) << i;
+                let apart = (q[i] - inverse).abs() - inverse * self.depth;
+                let h = &self.ahead;
+                let turned = self.least - (a[i] * h[0] + b[i] * h[1] + c[i] * h[2]);
+                far[i] = if apart.max(turned) > 0.0 { f32::MAX } else { du * du + dv * dv };
             }
-            near.bits[y - mask.top] &= bits;
+            let mut bits = 0u32;
+            for i in 0..TILE {
+                bits |= u32::from(far[i] <= self.accepted) << i;
+            }
+            near[y] &= bits;
         }
         near
     }
