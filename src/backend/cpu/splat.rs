@@ -2,6 +2,7 @@
 //! key of 0 marks samples of others, so that one comparison decides ownership and depth. The task ends with its
 //! pixels' colours, so that no picture of keys is ever written.
 
+mod blend;
 mod hits;
 mod packed;
 mod projection;
@@ -12,6 +13,7 @@ use fearless_simd::{Level, dispatch, f32x16};
 use glam::Vec3;
 use rayon::prelude::*;
 
+use self::blend::Layers;
 use self::hits::Hits;
 use self::packed::Packed;
 pub(crate) use self::projection::Projection;
@@ -33,9 +35,6 @@ pub(crate) const FILLS: u64 = 1 << 63;
 pub(crate) const EDGE_TOLERANCE: f32 = 1e-3;
 /// Surfels projected at a time before they are splatted.
 const CHUNK: usize = 1024;
-/// How much deeper than the middle of a disk its rim counts, in radii: more than the slope of most surfaces lets the
-/// rim of a neighbour come nearer (untuned).
-const RISE: f32 = 2.0;
 /// Of a surfel in a camera.
 const MAX_IMAGES: usize = 3;
 /// A camera with more surfels than this shares them with idle threads (untuned).
@@ -95,7 +94,7 @@ pub(crate) struct Scratch {
     packed: Packed,
     hits: Hits,
     tile: Vec<u64>,
-    pinholes: Vec<(usize, u64)>,
+    layers: Layers,
 }
 
 /// Runs the pass. Every pixel of a mirror belongs to one patch, so no pixel is in the lists twice.
@@ -140,7 +139,8 @@ impl PatchWork<'_> {
         if cameras.is_empty() {
             return counters;
         }
-        let Scratch { batches, packed, hits, tile, pinholes } = scratch;
+        let Scratch { batches, packed, hits, tile, layers } = scratch;
+        hits.len = 0;
         fill_tile(tile, pass, patch, visibility);
         for camera in &pass.cameras[cameras] {
             let start = Instant::now();
@@ -157,15 +157,15 @@ impl PatchWork<'_> {
         }
         let start = Instant::now();
         if pass.shape == SplatShape::Ellipse {
-            fill_pinholes(tile, stride as usize, pinholes);
+            layers.draw(hits, &surfels.radiance, stride as usize, tile);
         }
-        self.resolve(tile, stride as usize, landed);
+        self.resolve(tile, layers, stride as usize, landed);
         counters.splat_ns += nanoseconds(start, Instant::now());
         counters
     }
 
     /// From the samples of the tile to the patch's pixels.
-    fn resolve(&self, tile: &[u64], stride: usize, landed: &mut Vec<Landed>) {
+    fn resolve(&self, tile: &[u64], layers: &Layers, stride: usize, landed: &mut Vec<Landed>) {
         let rect = self.pass.patches[self.index].rect;
         let side = self.pass.samples as usize;
         let share = 1.0 / (side * side) as f32;
@@ -188,7 +188,18 @@ impl PatchWork<'_> {
                         radiance += self.surfels.radiance[surfel];
                     }
                 }
-                if key != EMPTY {
+                if self.pass.shape == SplatShape::Ellipse {
+                    let at = row * stride + column;
+                    let value = layers.at(at);
+                    if tile[at] != EMPTY && tile[at] != FOREIGN && value.w > 0.0 {
+                        landed.push(Landed {
+                            pixel: y * self.visibility.size.width + x,
+                            coverage: value.w,
+                            radiance: value.truncate(),
+                            key: tile[at],
+                        });
+                    }
+                } else if key != EMPTY {
                     landed.push(Landed {
                         pixel: y * self.visibility.size.width + x,
                         coverage: count * share,
@@ -234,6 +245,7 @@ impl Shared<'_> {
         let (a, b) = rayon::join(
             || self.project(left, packed, hits, tile),
             || {
+                other_hits.len = 0;
                 fill_tile(other_tile, self.work.pass, self.work.patch, self.visibility);
                 self.project(right, other_packed, other_hits, other_tile)
             },
@@ -241,6 +253,7 @@ impl Shared<'_> {
         for (key, found) in tile.iter_mut().zip(other_tile) {
             *key = (*key).min(*found);
         }
+        hits.append(other_hits);
         a.plus(b)
     }
 
@@ -267,10 +280,15 @@ impl Shared<'_> {
             }
             let count = packed.len();
             packed.pad();
-            hits.clear(MAX_IMAGES * count + PADDING);
+            if self.work.pass.shape != SplatShape::Ellipse {
+                hits.len = 0;
+            }
+            hits.reserve(MAX_IMAGES * count + PADDING);
             let valid = dispatch!(self.level, simd => self.work.run::<_, Pair<f32x16<_>>>(simd, packed, count, hits));
             let projected = Instant::now();
-            hits.draw(self.work.pass.shape, self.work.stride as usize, tile);
+            if self.work.pass.shape != SplatShape::Ellipse {
+                hits.draw_squares(self.work.pass.shape, self.work.stride as usize, tile);
+            }
             let done = Instant::now();
             counters.projections += count as u64;
             counters.valid += valid;
@@ -279,27 +297,6 @@ impl Shared<'_> {
             last = done;
         }
         counters
-    }
-}
-
-/// Closes gaps of one sample between two that are covered, where disks do not quite meet. Silhouettes stay.
-fn fill_pinholes(tile: &mut [u64], stride: usize, found: &mut Vec<(usize, u64)>) {
-    found.clear();
-    for at in stride + 1..tile.len() - stride - 1 {
-        if tile[at] != EMPTY {
-            continue;
-        }
-        for (a, b) in [(at - 1, at + 1), (at - stride, at + stride)] {
-            let [a, b] = [tile[a], tile[b]];
-            // Neither is a gap nor another patch's.
-            if a.max(b) != EMPTY && a.min(b) != FOREIGN {
-                found.push((at, a.max(b)));
-                break;
-            }
-        }
-    }
-    for &(at, key) in &*found {
-        tile[at] = key;
     }
 }
 

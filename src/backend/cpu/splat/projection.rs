@@ -4,7 +4,7 @@ use fearless_simd::Simd;
 
 use super::hits::Hits;
 use super::packed::Packed;
-use super::{BORDER, EDGE_TOLERANCE, RISE};
+use super::{BORDER, EDGE_TOLERANCE};
 use crate::camera::three_ray::project::along;
 use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
@@ -12,14 +12,37 @@ use crate::geometry::lanes::{Real, Vector, dot};
 use crate::plan::{CameraInstance, DepthKey, LARGEST_ELLIPSE, SplatPass, SplatShape};
 use crate::visibility::Patch;
 
-/// An ellipse's form (see [`Projection::form`]) that ends at [`LARGEST_ELLIPSE`], and half its width and height.
-#[inline(always)]
-fn capped<R: Real<Scalar = f32>>([a, b, c]: [R; 3]) -> ([R; 3], [R; 2]) {
-    let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
-    let (a, c) = (a.max(a.splat(0.0)) + least, c.max(c.splat(0.0)) + least);
-    let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
-    let most = a.splat(LARGEST_ELLIPSE);
-    ([a, b, c], [(c * inverse).sqrt().min(most), (a * inverse).sqrt().min(most)])
+/// A splat's kernel in the picture: 1 - (a x² + 2 b x y + c y²), squared.
+struct Kernel<R> {
+    form: [R; 3],
+    /// Half its width and height.
+    half: [R; 2],
+    /// Value in the middle: its integral is the disk's area.
+    weight: R,
+}
+
+/// The kernel of a disk is so many times as wide as the disk that holds a surfel (untuned).
+const SPREAD: f32 = 1.0;
+/// Radius of the kernel of a point, in samples: what a pixel sees of it (untuned).
+const PIXEL: f32 = 1.0;
+
+impl<R: Real<Scalar = f32>> Kernel<R> {
+    /// `form`: the disk that holds a surfel (see [`Frame::form`]); `share`: of its area, that is the surfel's.
+    #[inline(always)]
+    fn new([a, b, c]: [R; 3], share: R) -> Self {
+        let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
+        let (a, c) = (a + least, c + least);
+        let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
+        // The disk's ellipse and the pixel's add as variances do.
+        let spread = inverse * (SPREAD * SPREAD);
+        let (xx, xy, yy) = (c * spread + PIXEL * PIXEL, b * spread, a * spread + PIXEL * PIXEL);
+        let per_det = a.splat(1.0) / (xx * yy - xy * xy);
+        Self {
+            form: [yy * per_det, xy * per_det, xx * per_det],
+            half: [xx.sqrt(), yy.sqrt()],
+            weight: (inverse * per_det).sqrt() * share * 3.0,
+        }
+    }
 }
 
 /// How the point of the ray that is seen moves, across the ray, with the place on the screen: a sample to the right and
@@ -43,6 +66,10 @@ impl<R: Real<Scalar = f32>> Frame<R> {
     }
 }
 
+/// A surfel's own disk has this share of the area of the one that holds a surfel.
+const PER_DISK: f32 = 1.0 / (1.5 * 1.5);
+/// Where a back may be seen as well, surfels are not taken for thinner than this.
+const LEAST_FACING: f32 = 0.05;
 /// A cell's camera is at most about so many pixels beside the exact rays.
 const CELL_SLACK_PX: f32 = 1.0;
 /// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
@@ -94,7 +121,7 @@ impl Projection<'_> {
         let width = V::broadcast(simd, (self.stride - BORDER) as f32 + beyond);
         let rows = self.patch.rect.height() * self.pass.samples;
         let height = V::broadcast(simd, (rows + BORDER) as f32 + beyond);
-        let mut len = 0;
+        let mut len = hits.len;
         let mut i = 0;
         while i < count {
             let lanes = (count - i).min(V::LANES as usize);
@@ -139,7 +166,9 @@ impl Projection<'_> {
                 }
                 let form = frame.form(size);
                 if self.pass.shape == SplatShape::Ellipse {
-                    let (form, [wide, high]) = capped(form);
+                    let facing = self.facing(simd, image, &packed.surfel[i..]);
+                    lands = lands & zero.lt(facing);
+                    let Kernel { form, half: [wide, high], weight } = Kernel::new(form, facing * PER_DISK);
                     lands = lands
                         & zero.le(x + wide)
                         & (x - wide).lt(width)
@@ -148,8 +177,7 @@ impl Projection<'_> {
                     if !V::any(lands) {
                         continue;
                     }
-                    let rise = (one / size).sqrt() * (self.camera.radius * RISE);
-                    let values = [x, y, form[0], form[1], form[2], wide, high, rise];
+                    let values = [x, y, form[0], form[1], form[2], wide, high, weight];
                     for (value, list) in values.into_iter().zip(&mut hits.ellipse) {
                         value.compress(lands, &mut list[len..]);
                     }
@@ -219,6 +247,25 @@ impl Projection<'_> {
         let limit = V::broadcast(simd, MOST_CORRECTION_PX * self.pass.samples as f32);
         let bounded = |d: V| V::select(usable, d, zero).max(-limit).min(limit);
         [bounded((u * c - v * b) * share), bounded((v * a - u * b) * share)]
+    }
+
+    /// The cosine between the ray and the surfel's normal; not positive where it shows a hidden back.
+    #[inline(always)]
+    fn facing<S: Simd, V: Vector<S>>(&self, simd: S, image: &Image<V>, surfels: &[u32]) -> V {
+        let mut n = [[0.0f32; MOST_LANES]; 3];
+        for i in 0..V::LANES as usize {
+            let normal = self.surfels.normals[surfels[i] as usize];
+            (n[0][i], n[1][i], n[2][i]) = (normal.x, normal.y, normal.z);
+        }
+        let n = [V::load(simd, &n[0]), V::load(simd, &n[1]), V::load(simd, &n[2])];
+        let c = &self.camera.camera;
+        let d = [
+            image.linear([c.d1[0], c.f1[0], c.f2[0]]),
+            image.linear([c.d1[1], c.f1[1], c.f2[1]]),
+            image.linear([c.d1[2], c.f1[2], c.f2[2]]),
+        ];
+        let cosine = -dot(n, d) / dot(d, d).sqrt();
+        if self.camera.gaze.is_some() { cosine } else { cosine.abs().max(V::broadcast(simd, LEAST_FACING)) }
     }
 
     /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first sample

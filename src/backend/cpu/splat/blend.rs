@@ -1,0 +1,90 @@
+//! Ellipses to pixels. Every splat covers parts of pixels; from the nearest on, each pixel takes them until it is full.
+//! So a surface that covers it in part lets through what lies behind it, be it another surface or the environment.
+
+use glam::{Vec3, Vec4};
+
+use super::hits::Hits;
+use super::{BORDER, EMPTY};
+
+/// How much of a pixel splats cover for each part that their areas say: they are not spread so evenly that the areas
+/// add up everywhere (untuned).
+const GAIN: f32 = 1.3;
+
+/// One patch's pixels, by slot of its tile.
+#[derive(Default)]
+pub(super) struct Layers {
+    /// Splats from the nearest on: depth and index.
+    order: Vec<u64>,
+    /// Radiance times coverage, and coverage.
+    sum: Vec<Vec4>,
+}
+
+impl Layers {
+    /// Draws what was hit into a tile with rows of `stride` slots. Those that are `EMPTY` in `tile` are taken; they
+    /// get the key of their nearest splat.
+    pub(super) fn draw(&mut self, hits: &Hits, radiance: &[Vec3], stride: usize, tile: &mut [u64]) {
+        self.sum.clear();
+        self.sum.extend(tile.iter().map(|&key| if key == EMPTY { Vec4::ZERO } else { Vec4::W }));
+        self.order.clear();
+        let depths = hits.depth[..hits.len].iter().zip(0u32..);
+        self.order.extend(depths.map(|(d, i)| u64::from(d.to_bits()) << 32 | u64::from(i)));
+        self.order.sort_unstable();
+        for &next in &self.order {
+            #[expect(clippy::cast_possible_truncation, reason = "the low half")]
+            let i = next as u32 as usize;
+            let surfel = hits.surfel[i];
+            let color = radiance[surfel as usize].extend(1.0);
+            let key = next & !u64::from(u32::MAX) | u64::from(surfel);
+            let weight = hits.ellipse[WEIGHT][i] * GAIN;
+            hits.each(i, stride, tile.len(), |slot, kernel| {
+                let sum = &mut self.sum[slot];
+                if sum.w < 1.0 {
+                    if sum.w == 0.0 {
+                        tile[slot] = key;
+                    }
+                    *sum += color * (kernel * weight).min(1.0 - sum.w);
+                }
+            });
+        }
+    }
+
+    /// Radiance, weighted by coverage, and coverage of a slot.
+    pub(super) fn at(&self, slot: usize) -> Vec4 {
+        self.sum[slot]
+    }
+}
+
+/// Index of a splat's weight in [`Hits::ellipse`].
+const WEIGHT: usize = 7;
+
+impl Hits {
+    /// Calls `touch` with every slot of the tile that a splat reaches, and its kernel there.
+    #[inline(always)]
+    fn each(&self, i: usize, stride: usize, len: usize, mut touch: impl FnMut(usize, f32)) {
+        let border = BORDER as usize;
+        // The last column and row within the border.
+        let [right, bottom] = [stride, len / stride].map(|n| (n - border - 1) as f32);
+        let left = BORDER as f32;
+        let e = &self.ellipse;
+        let (x, y, a, b, c) = (e[0][i], e[1][i], e[2][i], e[3][i], e[4][i]);
+        let (wide, high) = (e[5][i], e[6][i]);
+        // Centres of samples lie half a sample behind their index. Not negative: casts truncate, which is floor.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "see above")]
+        let range = |at: f32, reach: f32, end: f32| {
+            let (from, to) = ((at - reach - 0.5).ceil().max(left), (at + reach - 0.5).min(end));
+            if from <= to { from as usize..to as usize + 1 } else { 0..0 }
+        };
+        let columns = range(x, wide, right);
+        for row in range(y, high, bottom) {
+            let dy = row as f32 + 0.5 - y;
+            let (slope, rest) = (2.0 * b * dy, c * dy * dy);
+            for column in columns.clone() {
+                let dx = column as f32 + 0.5 - x;
+                let inside = 1.0 - (dx * (a * dx + slope) + rest);
+                if inside > 0.0 {
+                    touch(row * stride + column, inside * inside);
+                }
+            }
+        }
+    }
+}
