@@ -106,7 +106,7 @@ impl Walk<'_> {
         loop {
             let tested = test_children(simd, node, volume, self.test, lambda);
             let mut bits = tested.meets & node.used;
-            if let Some(gaze) = &self.gaze {
+            if let Some(gaze) = self.gaze.as_ref().filter(|_| crate::geometry::lanes::tune(7) != 2.0) {
                 bits &= !turned_away(simd, node, gaze);
             }
             let small = if self.per_pixel > 0.0 { self.small(simd, node, &tested) } else { [0; 3] };
@@ -207,9 +207,9 @@ impl Walk<'_> {
         let det = (a * c - b * b).max(zero);
         // The product of the footprint's two widths, and nearly its smaller width squared: no splat is seen longer
         // than so many pixels.
-        let longest = self.per_pixel * (2.0 * LONGEST_PX * LONGEST_PX);
+        let longest = self.per_pixel * (2.0 * crate::geometry::lanes::tune(3) * crate::geometry::lanes::tune(3));
         let area = det.sqrt();
-        let seen = area.min((det / (a + c) * longest).max(area * FINEST));
+        let seen = area.min((det / (a + c) * longest).max(area * crate::geometry::lanes::tune(4)));
         let real = zero.lt(radius);
         [
             V::<S>::bits(needed.le(seen) & real),

@@ -142,6 +142,7 @@ impl PatchWork<'_> {
         let Scratch { batches, packed, hits, tile, layers } = scratch;
         hits.len = 0;
         fill_tile(tile, pass, patch, visibility);
+        let cameras_n = cameras.len();
         for camera in &pass.cameras[cameras] {
             let start = Instant::now();
             batches.clear();
@@ -156,6 +157,23 @@ impl PatchWork<'_> {
             counters = counters.plus(shared.project(batches, packed, hits, tile));
         }
         let start = Instant::now();
+        if let Ok(v) = std::env::var("PX") {
+            let v: Vec<u32> = v.split(',').map(|x| x.parse().unwrap()).collect();
+            if v[0] >= patch.rect.min[0] && v[0] < patch.rect.max[0] && v[1] >= patch.rect.min[1] && v[1] < patch.rect.max[1] && patch.owns(visibility, &pass.pixels.rows, v[0], v[1]) {
+                let e = &hits.ellipse;
+                eprintln!("patch {:?} cams {} hits {}", patch, cameras_n, hits.len);
+                let c = &pass.cameras[pass.patch_cameras[index] as usize];
+                eprintln!("lambda {:?} foot {:?}", c.lambda, c.footprint);
+                let (px, py) = ((v[0] - patch.rect.min[0]) as f32 + 1.5, (v[1] - patch.rect.min[1]) as f32 + 1.5);
+                for i in 0..hits.len {
+                    let (dx, dy) = (px - e[0][i], py - e[1][i]);
+                    let q = e[2][i]*dx*dx + 2.0*e[3][i]*dx*dy + e[4][i]*dy*dy;
+                    if true {
+                        eprintln!("hit d {dx:.2} {dy:.2} q {q:.2} form {:.3} {:.3} {:.3} half {:.2} {:.2} w {:.4} depth {:.4} surfel {}", e[2][i], e[3][i], e[4][i], e[5][i], e[6][i], e[7][i], hits.depth[i], hits.surfel[i]);
+                    }
+                }
+            }
+        }
         if pass.shape == SplatShape::Ellipse {
             layers.draw(hits, &surfels.radiance, stride as usize, tile);
         }

@@ -95,7 +95,7 @@ pub(super) struct View<'a> {
     /// Positive where a corner's ray leaves the mirror on its front side.
     pub(super) front: [f64; 3],
     /// Of a cell: what holds its pixels, and how far beyond it its rays may be continued, in pixels.
-    pub(super) outline: Option<(Outline, f64)>,
+    pub(super) outline: Option<(Outline, DVec2)>,
 }
 
 fn of_triangle<'a>(frame: FrameInput<'_>, patch: &'a Patch, scale: RayScale) -> View<'a> {
@@ -157,12 +157,12 @@ pub(super) fn of_view(
     let position = eye.position.as_dvec3();
     let corners_px = rays.origins.map(|v| homogeneous(eye, v));
     let reach = settings.reach();
-    let grown_px = |outline: &Outline, most: f64, splat_px: f64| {
-        let px = reach.samples + splat_px.min(reach.splat).min(most) + CELL_SLACK_PX;
+    let grown_px = |(outline, most): &(Outline, DVec2), splat_px: DVec2| {
+        let px = splat_px.min(DVec2::splat(reach.splat)).min(*most) + reach.samples + CELL_SLACK_PX;
         Grown::Four(guard::weights_of(&corners_px, outline.grown(px)))
     };
     let around = match outline {
-        Some((outline, most)) => grown_px(outline, *most, reach.splat),
+        Some(outline) => grown_px(outline, DVec2::INFINITY),
         None => Grown::Three(guard::around(&corners_px, patch, reach)),
     };
     let volume = around.volume(rays);
@@ -214,15 +214,20 @@ pub(super) fn of_view(
                 let area = if detail > 0.0 { footprint.area_per_px(lambda) / detail } else { 0.0 };
                 radius.max(EVENNESS * (area / std::f64::consts::PI).sqrt())
             };
-            let splat_px = guard::splat_px(holds, footprint, range_f64);
             let grown = match (guard, outline) {
-                (None, Some((outline, most))) => grown_px(outline, *most, splat_px),
-                (Some(guard), _) => Grown::Three(guard.margins(splat_px)),
+                (Some(guard), _) => {
+                    Grown::Three(guard.margins(guard::splat_px(holds, footprint, range_f64)))
+                }
+                (None, Some(outline)) => {
+                    let [lo, hi] = range_f64;
+                    let extent = |lambda: f64| {
+                        footprint.extent_px(lambda, outline.0.along) * holds(lambda)
+                    };
+                    let extents = [lo, 0.5 * (lo + hi), hi].map(extent);
+                    grown_px(outline, extents.into_iter().fold(DVec2::ZERO, DVec2::max))
+                }
                 (None, None) => unreachable!("triangles have guards"),
             };
-            if std::env::var_os("CELLR").is_some() {
-                eprintln!("S {} {} {} {:.2}", patch.pixels, patch.rect.width(), patch.rect.height(), splat_px);
-            }
             let own = rays_in(to_scene, rays);
             let own_grown = grown.triangle(&own);
             let several = mixed_sign_range(&own_grown, range_f64[0], range_f64[1]);

@@ -175,13 +175,13 @@ impl Cells {
         };
         let outline = outline(&group.rows, origin);
         let plane = inverse_depth(&group.linear, origin, &outline);
-        let [a, b, _, c] = outline.grown(0.0);
+        let [a, b, _, c] = outline.grown(DVec2::ZERO);
         let rays = construction_rays(frame.eye, origin, [a, b, c], &group.linear, plane, settings.ray_scale);
         let cameras = self.cameras.len();
-        let most = farthest(&group.linear);
+        let most = farthest(&group.linear, outline.along);
         let view = View { patch: &patch, rays, front: [1.0; 3], outline: Some((outline, most)) };
         of_view(frame, top, &view, index(self.patches.len()), settings, &mut self.cameras);
-        if std::env::var_os("CELLG").is_some() && origin == [992, 416] {
+        if std::env::var_os("CELLG").is_some() && origin == [1024, 384] {
             eprintln!("G {:?} px {} {:?} rays {:?} cams {:?}", rect, patch.pixels, group.linear, rays, self.cameras[cameras..].iter().map(|c| (c.lambda, c.several, c.camera.wide)).collect::<Vec<_>>());
         }
         if self.cameras.len() == cameras {
@@ -295,14 +295,17 @@ fn outline(mask: &Mask, origin: [u32; 2]) -> Outline {
     }
 }
 
-/// How many pixels beyond its own a cell's rays may be continued: they turn by this at most.
+/// How many pixels beyond its own a cell's rays may be continued along a direction and across it: they turn by so much
+/// at most (untuned).
 const MOST_TURN: f64 = 0.5;
 
-fn farthest(linear: &Linear<4>) -> f64 {
+fn farthest(linear: &Linear<4>, along: DVec2) -> DVec2 {
     let [r0, r1, r2, _] = linear.right.map(f64::from);
     let [b0, b1, b2, _] = linear.down.map(f64::from);
-    let steepest = (DVec3::new(r0, r1, r2).length_squared() + DVec3::new(b0, b1, b2).length_squared()).sqrt();
-    (MOST_TURN / steepest).max(1.0)
+    let (right, down) = (DVec3::new(r0, r1, r2), DVec3::new(b0, b1, b2));
+    let turn = |direction: DVec2| (right * direction.x + down * direction.y).length();
+    let most = DVec2::new(MOST_TURN / turn(along), MOST_TURN / turn(along.perp()));
+    most.max(DVec2::ONE)
 }
 
 fn middle(origin: [u32; 2]) -> DVec2 {

@@ -44,6 +44,17 @@ impl Footprint {
         map.x_axis.reject_from(self.axis).cross(map.y_axis.reject_from(self.axis)).length()
     }
 
+    /// Half the extent, in pixels along two directions of the picture that are at right angles, of what lies within a
+    /// unit of the ray at λ. Not numbers or infinite where T(λ) has no area.
+    pub(super) fn extent_px(&self, lambda: f64, along: DVec2) -> DVec2 {
+        let map = self.base + self.per_lambda * lambda;
+        let (x, y) = (map.x_axis.reject_from(self.axis), map.y_axis.reject_from(self.axis));
+        let (along, across) = (x * along.x + y * along.y, y * along.x - x * along.y);
+        // The diagonal of the inverse of the Gram matrix.
+        let det = along.length_squared() * across.length_squared() - along.dot(across).powi(2);
+        DVec2::new((across.length_squared() / det).sqrt(), (along.length_squared() / det).sqrt())
+    }
+
     /// How many pixels a unit across the rays covers at most, at λ. Not a number or infinite where T(λ) has no area.
     pub(super) fn px_per_unit(&self, lambda: f64) -> f64 {
         let map = self.base + self.per_lambda * lambda;

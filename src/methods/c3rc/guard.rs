@@ -82,10 +82,10 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    /// Corners of the rectangle that is larger by so many pixels all around, in order.
-    pub(super) fn grown(&self, px: f64) -> [DVec2; 4] {
-        let along = self.along * (self.half.x + px);
-        let across = self.along.perp() * (self.half.y + px);
+    /// Corners of the rectangle that is larger by so many pixels at its ends and its sides, in order.
+    pub(super) fn grown(&self, px: DVec2) -> [DVec2; 4] {
+        let along = self.along * (self.half.x + px.x);
+        let across = self.along.perp() * (self.half.y + px.y);
         let Self { center, .. } = *self;
         [
             center - along - across,

@@ -35,7 +35,7 @@ impl Layers {
             let surfel = hits.surfel[i];
             let color = radiance[surfel as usize].extend(1.0);
             let key = next & !u64::from(u32::MAX) | u64::from(surfel);
-            let weight = hits.ellipse[WEIGHT][i] * GAIN;
+            let weight = hits.ellipse[WEIGHT][i] * crate::geometry::lanes::tune(0);
             hits.each(i, stride, tile.len(), |slot, kernel| {
                 let sum = &mut self.sum[slot];
                 if sum.w < 1.0 {

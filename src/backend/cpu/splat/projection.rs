@@ -34,8 +34,10 @@ impl<R: Real<Scalar = f32>> Kernel<R> {
         let (a, c) = (a + least, c + least);
         let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
         // The disk's ellipse and the pixel's add as variances do.
-        let spread = inverse * (SPREAD * SPREAD);
-        let (xx, xy, yy) = (c * spread + PIXEL * PIXEL, b * spread, a * spread + PIXEL * PIXEL);
+        let sp = crate::geometry::lanes::tune(1);
+        let px = crate::geometry::lanes::tune(2);
+        let spread = inverse * (sp * sp);
+        let (xx, xy, yy) = (c * spread + px * px, b * spread, a * spread + px * px);
         let per_det = a.splat(1.0) / (xx * yy - xy * xy);
         Self {
             form: [yy * per_det, xy * per_det, xx * per_det],
@@ -49,6 +51,13 @@ impl<R: Real<Scalar = f32>> Kernel<R> {
 /// a sample down. In the camera's unit, see [`CameraInstance::per_sample`].
 #[derive(Clone, Copy)]
 struct Frame<R> {
+    right: [R; 3],
+    down: [R; 3],
+}
+
+/// The difference of the exact rays about a pixel from the camera's, where they meet the surfel; as [`Frame`].
+struct Bend<R> {
+    apart: [R; 3],
     right: [R; 3],
     down: [R; 3],
 }
@@ -74,8 +83,6 @@ const LEAST_FACING: f32 = 0.05;
 const CELL_SLACK_PX: f32 = 1.0;
 /// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
 const MOST_CORRECTION_PX: f32 = 2.0;
-/// Steps from the camera's image to that of the exact rays.
-const CORRECTIONS: usize = 1;
 /// Of any vector.
 const MOST_LANES: usize = 32;
 
@@ -157,12 +164,16 @@ impl Projection<'_> {
                 }
                 let d = self.direction(image);
                 let depth = self.depth(image, d);
-                let frame = self.frame(image, d);
+                let mut frame = self.frame(image, d);
                 if let Some(deviations) = deviations {
-                    for _ in 0..CORRECTIONS {
-                        let [dx, dy] = self.correction(simd, deviations, image, &frame, [x, y], offset, lands);
-                        (x, y) = (x + dx, y + dy);
+                    let bent = self.bend(simd, deviations, image, [x, y], offset, lands);
+                    // The exact rays about the pixel are the model's and their difference.
+                    for k in 0..3 {
+                        frame.right[k] = frame.right[k] + bent.right[k] * crate::geometry::lanes::tune(6);
+                        frame.down[k] = frame.down[k] + bent.down[k] * crate::geometry::lanes::tune(6);
                     }
+                    let [dx, dy] = self.correction(simd, &frame, bent.apart);
+                    (x, y) = (x + dx, y + dy);
                 }
                 let form = frame.form(size);
                 if self.pass.shape == SplatShape::Ellipse {
@@ -211,42 +222,79 @@ impl Projection<'_> {
         }
     }
 
-    /// From the image at (`x`, `y`) to where the exact ray of that pixel says that it is, in samples.
+    /// How far the exact ray of the pixel at (`x`, `y`) runs beside the camera's, and how that changes about it.
     #[inline(always)]
-    fn correction<S: Simd, V: Vector<S>>(
+    fn bend<S: Simd, V: Vector<S>>(
         &self,
         simd: S,
         deviations: &[[f32; 3]],
         image: &Image<V>,
-        frame: &Frame<V>,
         [x, y]: [V; 2],
         offset: f32,
         lands: V::Mask,
-    ) -> [V; 2] {
+    ) -> Bend<V> {
         let zero = V::broadcast(simd, 0.0);
         let to_px = 1.0 / self.pass.samples as f32;
-        let (width, height) = (self.patch.rect.width() as f32, self.patch.rect.height() as f32);
-        let column = ((x - offset) * to_px).floor().max(zero).min(V::broadcast(simd, width - 1.0));
-        let row = ((y - offset) * to_px).floor().max(zero).min(V::broadcast(simd, height - 1.0));
-        let mut at = [0.0f32; MOST_LANES];
-        V::select(lands, row * width + column, zero).store(&mut at);
-        let mut e = [[0.0f32; MOST_LANES]; 3];
+        let (width, height) = (self.patch.rect.width(), self.patch.rect.height());
+        let last = [width, height].map(|n| V::broadcast(simd, n as f32 - 1.0));
+        let (x, y) = ((x - offset) * to_px, (y - offset) * to_px);
+        let (column, row) = (x.floor().max(zero).min(last[0]), y.floor().max(zero).min(last[1]));
+        let mut at = [[0.0f32; MOST_LANES]; 2];
+        V::select(lands, column, zero).store(&mut at[0]);
+        V::select(lands, row, zero).store(&mut at[1]);
+        let (mut e, mut r, mut d) =
+            ([[0.0f32; MOST_LANES]; 3], [[0.0f32; MOST_LANES]; 3], [[0.0f32; MOST_LANES]; 3]);
+        let width = width as usize;
+        let (last_column, last_row) = (width - 1, height as usize - 1);
         for i in 0..V::LANES as usize {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and clamped")]
-            let deviation = deviations[at[i] as usize];
+            let (column, row) = (at[0][i] as usize, at[1][i] as usize);
+            let (left, right) = (column.saturating_sub(1), (column + 1).min(last_column));
+            let (top, bottom) = (row.saturating_sub(1), (row + 1).min(last_row));
+            let own = &deviations[row * width + column];
+            let (a, b) = (&deviations[row * width + left], &deviations[row * width + right]);
+            let (c, f) = (&deviations[top * width + column], &deviations[bottom * width + column]);
+            let per_column = if right - left > 1 { 0.5 } else { 1.0 };
+            let per_row = if bottom - top > 1 { 0.5 } else { 1.0 };
             for k in 0..3 {
-                e[k][i] = deviation[k];
+                e[k][i] = own[k];
+                r[k][i] = (b[k] - a[k]) * per_column;
+                d[k][i] = (f[k] - c[k]) * per_row;
             }
         }
-        let e = [V::load(simd, &e[0]), V::load(simd, &e[1]), V::load(simd, &e[2])];
+        let scale = image.lambda * (1.0 / self.camera.radius);
+        let sample = scale * to_px;
+        let mut bend = Bend { apart: [zero; 3], right: [zero; 3], down: [zero; 3] };
+        // From the pixel's centre to the image.
+        let far = V::broadcast(simd, 2.0);
+        let (x, y) = (x - column - 0.5, y - row - 0.5);
+        let (x, y) = (x.max(-far).min(far), y.max(-far).min(far));
+        for k in 0..3 {
+            let (right, down) = (V::load(simd, &r[k]), V::load(simd, &d[k]));
+            bend.apart[k] = (V::load(simd, &e[k]) + right * x + down * y) * scale;
+            bend.right[k] = right * sample;
+            bend.down[k] = down * sample;
+        }
+        bend
+    }
+
+    /// From the camera's image to that of rays which run `apart` beside, in samples.
+    #[inline(always)]
+    fn correction<S: Simd, V: Vector<S>>(
+        &self,
+        simd: S,
+        frame: &Frame<V>,
+        apart: [V; 3],
+    ) -> [V; 2] {
+        let zero = V::broadcast(simd, 0.0);
         let [a, b, c] = frame.form(V::broadcast(simd, 1.0));
-        let (u, v) = (dot(frame.right, e), dot(frame.down, e));
+        let (u, v) = (dot(frame.right, apart), dot(frame.down, apart));
         let det = a * c - b * b;
         let usable = zero.lt(det);
-        let share = image.lambda * (-1.0 / self.camera.radius) / V::select(usable, det, V::broadcast(simd, 1.0));
-        let limit = V::broadcast(simd, MOST_CORRECTION_PX * self.pass.samples as f32);
-        let bounded = |d: V| V::select(usable, d, zero).max(-limit).min(limit);
-        [bounded((u * c - v * b) * share), bounded((v * a - u * b) * share)]
+        let share = V::select(usable, V::broadcast(simd, -1.0) / det, zero);
+        let limit = V::broadcast(simd, crate::geometry::lanes::tune(5) * self.pass.samples as f32);
+        let (dx, dy) = ((u * c - v * b) * share, (v * a - u * b) * share);
+        [dx.max(-limit).min(limit), dy.max(-limit).min(limit)]
     }
 
     /// The cosine between the ray and the surfel's normal; not positive where it shows a hidden back.
@@ -265,7 +313,7 @@ impl Projection<'_> {
             image.linear([c.d1[2], c.f1[2], c.f2[2]]),
         ];
         let cosine = -dot(n, d) / dot(d, d).sqrt();
-        if self.camera.gaze.is_some() { cosine } else { cosine.abs().max(V::broadcast(simd, LEAST_FACING)) }
+        if self.camera.gaze.is_some() && crate::geometry::lanes::tune(7) > 0.0 { cosine } else { cosine.abs().max(V::broadcast(simd, LEAST_FACING)) }
     }
 
     /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first sample
