@@ -34,6 +34,7 @@ impl BatchSource for Culler<'_> {
             representatives: object.representatives.start,
             footprint: &camera.footprint,
             gaze: camera.gaze.filter(|_| camera.detail > 0.0),
+            axis: camera.camera.axis,
             per_pixel: camera.detail * std::f32::consts::FRAC_PI_2,
         };
         let from = out.len();
@@ -67,6 +68,7 @@ struct Walk<'a> {
     representatives: u32,
     footprint: &'a [[f32; 3]; 3],
     gaze: Option<Gaze>,
+    axis: [f32; 3],
     /// π/2 representatives' radii squared are to be less than this many times the footprint; 0: see
     /// [`CameraInstance::detail`].
     per_pixel: f32,
@@ -82,10 +84,13 @@ struct Open {
     lambda: [f32; 2],
 }
 
-/// Half the length, in pixels, of the longest splat that one representative makes (untuned).
-const LONGEST_PX: f32 = 1.2;
-/// But no smaller share of the footprint than this is asked for.
-const FINEST: f32 = 0.25;
+/// Representatives of a level are taken from here on, in shares of the area that they should have at most: each level's
+/// are twice as large as the next one's, so that on average they have that area.
+const BETWEEN: f32 = std::f32::consts::SQRT_2;
+/// Normals within about this cosine of one say how large a node is seen (untuned).
+const AGREEING: f32 = 0.7;
+/// But not smaller than this share (untuned).
+const LEAST_FACING: f32 = 0.25;
 /// A wide level at least halves the surfels, and each leaves at most seven siblings open.
 const STACK: usize = 32 * (CHILDREN - 1) + 1;
 
@@ -106,7 +111,7 @@ impl Walk<'_> {
         loop {
             let tested = test_children(simd, node, volume, self.test, lambda);
             let mut bits = tested.meets & node.used;
-            if let Some(gaze) = self.gaze.as_ref().filter(|_| crate::geometry::lanes::tune(7) != 2.0) {
+            if let Some(gaze) = &self.gaze {
                 bits &= !turned_away(simd, node, gaze);
             }
             let small = if self.per_pixel > 0.0 { self.small(simd, node, &tested) } else { [0; 3] };
@@ -205,11 +210,13 @@ impl Walk<'_> {
         let needed = radius * radius * (self.per_pixel * 2.0);
         let zero = V::broadcast(simd, 0.0);
         let det = (a * c - b * b).max(zero);
-        // The product of the footprint's two widths, and nearly its smaller width squared: no splat is seen longer
-        // than so many pixels.
-        let longest = self.per_pixel * (2.0 * crate::geometry::lanes::tune(3) * crate::geometry::lanes::tune(3));
-        let area = det.sqrt();
-        let seen = area.min((det / (a + c) * longest).max(area * crate::geometry::lanes::tune(4)));
+        // Seen from the side a disk is as much smaller as its surfels' normals say, where they agree.
+        let axis = [0, 1, 2].map(|k| V::load(simd, &node.cone_axis[k]));
+        let one = V::broadcast(simd, 1.0);
+        let facing = dot_const(axis, self.axis).abs().max(V::broadcast(simd, LEAST_FACING));
+        let agree = V::broadcast(simd, AGREEING).lt(V::load(simd, &node.cone_cosine));
+        let needed = needed * V::select(agree, facing, one);
+        let seen = det.sqrt() * BETWEEN;
         let real = zero.lt(radius);
         [
             V::<S>::bits(needed.le(seen) & real),

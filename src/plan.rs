@@ -20,6 +20,8 @@ pub struct CameraInstance {
     pub several: [f32; 2],
     /// Direction of the ray in scene space by coordinate, linear in (b2, b3).
     pub direction: [[f32; 3]; 3],
+    /// From the object's directions to the scene's, by row.
+    pub rotation: [[f32; 3]; 3],
     /// Homogeneous screen coordinates (x·w, y·w, w) relative to the patch's rectangle, in samples, linear in (b2, b3).
     pub screen: [[f32; 3]; 3],
     /// How the point at λ moves in scene space with the place on the screen that sees it, a sample to the right and a

@@ -241,6 +241,10 @@ pub(super) fn of_view(
                 lambda: range,
                 several: several.map_or([1.0, 0.0], |(a, b)| [a as f32, b as f32]),
                 direction: [0, 1, 2].map(|k| linear_form(rays.directions.map(|d| d[k]))),
+                rotation: {
+                    let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|v| to_scene.direction(v));
+                    [0, 1, 2].map(|k| axes.map(|axis| axis[k] as f32))
+                },
                 screen: *screen,
                 per_sample: [footprint.base, footprint.per_lambda]
                     .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / (radius * samples)))),

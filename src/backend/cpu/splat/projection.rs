@@ -8,7 +8,7 @@ use super::{BORDER, EDGE_TOLERANCE};
 use crate::camera::three_ray::project::along;
 use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
-use crate::geometry::lanes::{Real, Vector, dot};
+use crate::geometry::lanes::{Real, Vector, dot, dot_const};
 use crate::plan::{CameraInstance, DepthKey, LARGEST_ELLIPSE, SplatPass, SplatShape};
 use crate::visibility::Patch;
 
@@ -27,9 +27,9 @@ const SPREAD: f32 = 1.0;
 const PIXEL: f32 = 1.0;
 
 impl<R: Real<Scalar = f32>> Kernel<R> {
-    /// `form`: the disk that holds a surfel (see [`Frame::form`]); `share`: of its area, that is the surfel's.
+    /// Of the disk that holds a surfel, see [`Frame::form`].
     #[inline(always)]
-    fn new([a, b, c]: [R; 3], share: R) -> Self {
+    fn new([a, b, c]: [R; 3]) -> Self {
         let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
         let (a, c) = (a + least, c + least);
         let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
@@ -42,7 +42,7 @@ impl<R: Real<Scalar = f32>> Kernel<R> {
         Self {
             form: [yy * per_det, xy * per_det, xx * per_det],
             half: [xx.sqrt(), yy.sqrt()],
-            weight: (inverse * per_det).sqrt() * share * 3.0,
+            weight: (inverse * per_det).sqrt() * (3.0 * PER_DISK),
         }
     }
 }
@@ -51,13 +51,6 @@ impl<R: Real<Scalar = f32>> Kernel<R> {
 /// a sample down. In the camera's unit, see [`CameraInstance::per_sample`].
 #[derive(Clone, Copy)]
 struct Frame<R> {
-    right: [R; 3],
-    down: [R; 3],
-}
-
-/// The difference of the exact rays about a pixel from the camera's, where they meet the surfel; as [`Frame`].
-struct Bend<R> {
-    apart: [R; 3],
     right: [R; 3],
     down: [R; 3],
 }
@@ -77,8 +70,8 @@ impl<R: Real<Scalar = f32>> Frame<R> {
 
 /// A surfel's own disk has this share of the area of the one that holds a surfel.
 const PER_DISK: f32 = 1.0 / (1.5 * 1.5);
-/// Where a back may be seen as well, surfels are not taken for thinner than this.
-const LEAST_FACING: f32 = 0.05;
+/// Surfels are not taken for thinner than this share of their width (untuned).
+const LEAST_FACING: f32 = 0.2;
 /// A cell's camera is at most about so many pixels beside the exact rays.
 const CELL_SLACK_PX: f32 = 1.0;
 /// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
@@ -111,7 +104,7 @@ impl Projection<'_> {
             SplatShape::Ellipse | SplatShape::Square1 => BORDER as f32,
             SplatShape::Square2 => BORDER as f32 - 0.5,
         };
-        let (zero, one) = (V::broadcast(simd, 0.0), V::broadcast(simd, 1.0));
+        let zero = V::broadcast(simd, 0.0);
         // An ellipse may reach the tile from outside.
         let beyond = match self.pass.shape {
             SplatShape::Ellipse => LARGEST_ELLIPSE,
@@ -164,22 +157,18 @@ impl Projection<'_> {
                 }
                 let d = self.direction(image);
                 let depth = self.depth(image, d);
-                let mut frame = self.frame(image, d);
+                let frame = self.frame(image, d);
                 if let Some(deviations) = deviations {
-                    let bent = self.bend(simd, deviations, image, [x, y], offset, lands);
-                    // The exact rays about the pixel are the model's and their difference.
-                    for k in 0..3 {
-                        frame.right[k] = frame.right[k] + bent.right[k] * crate::geometry::lanes::tune(6);
-                        frame.down[k] = frame.down[k] + bent.down[k] * crate::geometry::lanes::tune(6);
-                    }
-                    let [dx, dy] = self.correction(simd, &frame, bent.apart);
+                    let apart = self.apart(simd, deviations, image, [x, y], offset, lands);
+                    let [dx, dy] = self.correction(simd, &frame, apart);
                     (x, y) = (x + dx, y + dy);
                 }
-                let form = frame.form(size);
                 if self.pass.shape == SplatShape::Ellipse {
-                    let facing = self.facing(simd, image, &packed.surfel[i..]);
-                    lands = lands & zero.lt(facing);
-                    let Kernel { form, half: [wide, high], weight } = Kernel::new(form, facing * PER_DISK);
+                    let normal = self.normals(simd, &packed.surfel[i..]);
+                    let (frame, facing, thin) = self.on_surface(&frame, d, normal);
+                    lands = lands & facing;
+                    let Kernel { form, half: [wide, high], weight } = Kernel::new(frame.form(size));
+                    let weight = weight * thin;
                     lands = lands
                         & zero.le(x + wide)
                         & (x - wide).lt(width)
@@ -194,7 +183,7 @@ impl Projection<'_> {
                     }
                 } else {
                     let cell = [x.floor(), y.floor()];
-                    let fills = self.fills(form, [cell[0] - x, cell[1] - y]);
+                    let fills = self.fills(frame.form(size), [cell[0] - x, cell[1] - y]);
                     V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
                 }
                 depth.compress(lands, &mut hits.depth[len..]);
@@ -222,9 +211,9 @@ impl Projection<'_> {
         }
     }
 
-    /// How far the exact ray of the pixel at (`x`, `y`) runs beside the camera's, and how that changes about it.
+    /// How far the exact ray of the pixel at (`x`, `y`) runs beside the camera's, where they meet the surfel.
     #[inline(always)]
-    fn bend<S: Simd, V: Vector<S>>(
+    fn apart<S: Simd, V: Vector<S>>(
         &self,
         simd: S,
         deviations: &[[f32; 3]],
@@ -232,50 +221,26 @@ impl Projection<'_> {
         [x, y]: [V; 2],
         offset: f32,
         lands: V::Mask,
-    ) -> Bend<V> {
+    ) -> [V; 3] {
         let zero = V::broadcast(simd, 0.0);
         let to_px = 1.0 / self.pass.samples as f32;
-        let (width, height) = (self.patch.rect.width(), self.patch.rect.height());
-        let last = [width, height].map(|n| V::broadcast(simd, n as f32 - 1.0));
-        let (x, y) = ((x - offset) * to_px, (y - offset) * to_px);
-        let (column, row) = (x.floor().max(zero).min(last[0]), y.floor().max(zero).min(last[1]));
-        let mut at = [[0.0f32; MOST_LANES]; 2];
-        V::select(lands, column, zero).store(&mut at[0]);
-        V::select(lands, row, zero).store(&mut at[1]);
-        let (mut e, mut r, mut d) =
-            ([[0.0f32; MOST_LANES]; 3], [[0.0f32; MOST_LANES]; 3], [[0.0f32; MOST_LANES]; 3]);
-        let width = width as usize;
-        let (last_column, last_row) = (width - 1, height as usize - 1);
+        let (width, height) = (self.patch.rect.width() as f32, self.patch.rect.height() as f32);
+        let column = ((x - offset) * to_px).floor().max(zero).min(zero.splat(width - 1.0));
+        let row = ((y - offset) * to_px).floor().max(zero).min(zero.splat(height - 1.0));
+        let mut at = [0.0f32; MOST_LANES];
+        V::select(lands, row * width + column, zero).store(&mut at);
+        let mut e = [[0.0f32; MOST_LANES]; 3];
         for i in 0..V::LANES as usize {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and clamped")]
-            let (column, row) = (at[0][i] as usize, at[1][i] as usize);
-            let (left, right) = (column.saturating_sub(1), (column + 1).min(last_column));
-            let (top, bottom) = (row.saturating_sub(1), (row + 1).min(last_row));
-            let own = &deviations[row * width + column];
-            let (a, b) = (&deviations[row * width + left], &deviations[row * width + right]);
-            let (c, f) = (&deviations[top * width + column], &deviations[bottom * width + column]);
-            let per_column = if right - left > 1 { 0.5 } else { 1.0 };
-            let per_row = if bottom - top > 1 { 0.5 } else { 1.0 };
-            for k in 0..3 {
-                e[k][i] = own[k];
-                r[k][i] = (b[k] - a[k]) * per_column;
-                d[k][i] = (f[k] - c[k]) * per_row;
-            }
+            let deviation = deviations[at[i] as usize];
+            (e[0][i], e[1][i], e[2][i]) = (deviation[0], deviation[1], deviation[2]);
         }
         let scale = image.lambda * (1.0 / self.camera.radius);
-        let sample = scale * to_px;
-        let mut bend = Bend { apart: [zero; 3], right: [zero; 3], down: [zero; 3] };
-        // From the pixel's centre to the image.
-        let far = V::broadcast(simd, 2.0);
-        let (x, y) = (x - column - 0.5, y - row - 0.5);
-        let (x, y) = (x.max(-far).min(far), y.max(-far).min(far));
-        for k in 0..3 {
-            let (right, down) = (V::load(simd, &r[k]), V::load(simd, &d[k]));
-            bend.apart[k] = (V::load(simd, &e[k]) + right * x + down * y) * scale;
-            bend.right[k] = right * sample;
-            bend.down[k] = down * sample;
-        }
-        bend
+        [
+            V::load(simd, &e[0]) * scale,
+            V::load(simd, &e[1]) * scale,
+            V::load(simd, &e[2]) * scale,
+        ]
     }
 
     /// From the camera's image to that of rays which run `apart` beside, in samples.
@@ -292,28 +257,50 @@ impl Projection<'_> {
         let det = a * c - b * b;
         let usable = zero.lt(det);
         let share = V::select(usable, V::broadcast(simd, -1.0) / det, zero);
-        let limit = V::broadcast(simd, crate::geometry::lanes::tune(5) * self.pass.samples as f32);
+        let limit = V::broadcast(simd, MOST_CORRECTION_PX * self.pass.samples as f32);
         let (dx, dy) = ((u * c - v * b) * share, (v * a - u * b) * share);
         [dx.max(-limit).min(limit), dy.max(-limit).min(limit)]
     }
 
-    /// The cosine between the ray and the surfel's normal; not positive where it shows a hidden back.
+    /// The surfels' normals in scene space.
     #[inline(always)]
-    fn facing<S: Simd, V: Vector<S>>(&self, simd: S, image: &Image<V>, surfels: &[u32]) -> V {
+    fn normals<S: Simd, V: Vector<S>>(&self, simd: S, surfels: &[u32]) -> [V; 3] {
         let mut n = [[0.0f32; MOST_LANES]; 3];
         for i in 0..V::LANES as usize {
             let normal = self.surfels.normals[surfels[i] as usize];
             (n[0][i], n[1][i], n[2][i]) = (normal.x, normal.y, normal.z);
         }
         let n = [V::load(simd, &n[0]), V::load(simd, &n[1]), V::load(simd, &n[2])];
-        let c = &self.camera.camera;
-        let d = [
-            image.linear([c.d1[0], c.f1[0], c.f2[0]]),
-            image.linear([c.d1[1], c.f1[1], c.f2[1]]),
-            image.linear([c.d1[2], c.f1[2], c.f2[2]]),
-        ];
-        let cosine = -dot(n, d) / dot(d, d).sqrt();
-        if self.camera.gaze.is_some() && crate::geometry::lanes::tune(7) > 0.0 { cosine } else { cosine.abs().max(V::broadcast(simd, LEAST_FACING)) }
+        let r = &self.camera.rotation;
+        [dot_const(n, r[0]), dot_const(n, r[1]), dot_const(n, r[2])]
+    }
+
+    /// A frame along the ray `d` as one along the surfel's plane (Zwicker et al. 2001: the object's own
+    /// parametrisation), where the surfel does not show a hidden back, and how much thinner it is seen than the frame says.
+    #[inline(always)]
+    fn on_surface<R: Real<Scalar = f32>>(
+        &self,
+        frame: &Frame<R>,
+        d: [R; 3],
+        normal: [R; 3],
+    ) -> (Frame<R>, R::Mask, R) {
+        let zero = d[0].splat(0.0);
+        let along = dot(normal, d);
+        let front = along.lt(zero);
+        let facing = if self.camera.gaze.is_some() { front } else { front | !front };
+        // Seen from the side the frame's ends would lie far away.
+        let least = dot(d, d).sqrt() * LEAST_FACING;
+        let inverse = d[0].splat(1.0) / along.abs().max(least);
+        let thin = along.abs() * inverse;
+        let inverse = R::select(front, -inverse, inverse);
+        let (right_n, down_n) =
+            (dot(normal, frame.right) * inverse, dot(normal, frame.down) * inverse);
+        let mut on = *frame;
+        for k in 0..3 {
+            on.right[k] = frame.right[k] - right_n * d[k];
+            on.down[k] = frame.down[k] - down_n * d[k];
+        }
+        (on, facing, thin)
     }
 
     /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first sample
