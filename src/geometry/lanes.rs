@@ -458,15 +458,3 @@ pub fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
 
 #[cfg(test)]
 mod tests;
-
-pub fn tune(i: usize) -> f32 {
-    static T: std::sync::OnceLock<Vec<f32>> = std::sync::OnceLock::new();
-    T.get_or_init(|| {
-        let d = [1.3f32, 1.0, 1.0, 1.2, 0.25, 1.0, 1.0, 1.0];
-        let mut v = d.to_vec();
-        if let Ok(s) = std::env::var("TUNE") {
-            for (i, x) in s.split(',').enumerate() { if let Ok(x) = x.parse() { v[i] = x; } }
-        }
-        v
-    })[i]
-}

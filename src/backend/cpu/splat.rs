@@ -208,7 +208,7 @@ impl PatchWork<'_> {
                 }
                 if self.pass.shape == SplatShape::Ellipse {
                     let at = row * stride + column;
-                    let value = layers.at(at);
+                    let value = layers.at(at, stride);
                     if tile[at] != EMPTY && tile[at] != FOREIGN && value.w > 0.0 {
                         landed.push(Landed {
                             pixel: y * self.visibility.size.width + x,

@@ -12,7 +12,7 @@ use crate::camera::Eye;
 use crate::camera::RayScale;
 use crate::camera::three_ray::multiplicity::mixed_sign_range;
 use crate::camera::three_ray::{BoxTest, Rays, ThreeRay, ViewVolume, array};
-use crate::cull::test_children;
+use crate::cull::{Tested, test_children};
 use crate::geometry::Similarity;
 use crate::geometry::lanes::simd_level;
 use crate::plan::{CameraInstance, Gaze, SplatShape, Volume};
@@ -139,6 +139,64 @@ impl Top {
     }
 }
 
+/// What a view may see at most.
+struct Bounds {
+    corners_px: [DVec3; 3],
+    volume: Volume,
+    lambda: [f32; 2],
+}
+
+impl Bounds {
+    /// `None` if the view's triangle has no area.
+    fn new(eye: &Eye, top: &Top, view: &View<'_>, settings: CameraSettings) -> Option<Self> {
+        let View { patch, rays, outline, .. } = view;
+        let [v1, v2, v3] = rays.origins;
+        if (v2 - v1).cross(v3 - v1) == DVec3::ZERO {
+            return None;
+        }
+        let position = eye.position.as_dvec3();
+        let corners_px = rays.origins.map(|v| homogeneous(eye, v));
+        let reach = settings.reach();
+        let around = match outline {
+            Some(outline) => Grown::around(outline, &corners_px, reach, DVec2::INFINITY),
+            None => Grown::Three(guard::around(&corners_px, patch, reach)),
+        };
+        let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
+        let size = rays.origins.map(|v| (v - position).length());
+        let farthest = size.iter().fold(0.0, |m: f64, &s| m.max(s));
+        #[expect(clippy::cast_possible_truncation, reason = "a bound, not a measure")]
+        let lambda = [
+            (-CONTACT * farthest / shortest) as f32,
+            (SHORTENING * (top.reach + farthest) / shortest) as f32,
+        ];
+        Some(Self { corners_px, volume: around.volume(rays), lambda })
+    }
+
+    fn test(&self, top: &Top, group: &WideNode) -> Tested {
+        let Self { volume, lambda, .. } = self;
+        let (test, lambda) = (BoxTest::Slab, *lambda);
+        match volume {
+            Volume::Three(v) => {
+                dispatch!(top.level, simd => test_children(simd, group, v, test, lambda))
+            }
+            Volume::Four(v) => {
+                dispatch!(top.level, simd => test_children(simd, group, v, test, lambda))
+            }
+        }
+    }
+}
+
+/// Whether a view may see an object at all.
+pub(super) fn sees_objects(
+    eye: &Eye,
+    top: &Top,
+    view: &View<'_>,
+    settings: CameraSettings,
+) -> bool {
+    Bounds::new(eye, top, view, settings)
+        .is_some_and(|b| top.groups.iter().any(|g| b.test(top, g).meets & g.used != 0))
+}
+
 /// Appends the cameras of one view: one for each object that it may see.
 pub(super) fn of_view(
     frame: FrameInput<'_>,
@@ -150,42 +208,15 @@ pub(super) fn of_view(
 ) {
     let FrameInput { scene, eye, visibility } = frame;
     let View { patch, rays, front, outline } = view;
-    let [v1, v2, v3] = rays.origins;
-    if (v2 - v1).cross(v3 - v1) == DVec3::ZERO {
-        return;
-    }
+    let Some(bounds) = Bounds::new(eye, top, view, settings) else { return };
+    let corners_px = bounds.corners_px;
     let position = eye.position.as_dvec3();
-    let corners_px = rays.origins.map(|v| homogeneous(eye, v));
     let reach = settings.reach();
-    let grown_px = |(outline, most): &(Outline, DVec2), splat_px: DVec2| {
-        let px = splat_px.min(DVec2::splat(reach.splat)).min(*most) + reach.samples + CELL_SLACK_PX;
-        Grown::Four(guard::weights_of(&corners_px, outline.grown(px)))
-    };
-    let around = match outline {
-        Some(outline) => grown_px(outline, DVec2::INFINITY),
-        None => Grown::Three(guard::around(&corners_px, patch, reach)),
-    };
-    let volume = around.volume(rays);
-    let shortest = rays.directions.iter().map(|d| d.length()).fold(f64::INFINITY, f64::min);
-    let size = rays.origins.map(|v| (v - position).length());
-    let farthest = size.iter().fold(0.0, |m: f64, &s| m.max(s));
-    #[expect(clippy::cast_possible_truncation, reason = "a bound, not a measure")]
-    let lambda = [
-        (-CONTACT * farthest / shortest) as f32,
-        (SHORTENING * (top.reach + farthest) / shortest) as f32,
-    ];
     // Most patches see no object.
     let mut exact = None;
     let samples = f64::from(settings.samples);
     for (g, group) in top.groups.iter().enumerate() {
-        let tested = match &volume {
-            Volume::Three(volume) => {
-                dispatch!(top.level, simd => test_children(simd, group, volume, BoxTest::Slab, lambda))
-            }
-            Volume::Four(volume) => {
-                dispatch!(top.level, simd => test_children(simd, group, volume, BoxTest::Slab, lambda))
-            }
-        };
+        let tested = bounds.test(top, group);
         let mut bits = tested.meets & group.used;
         while bits != 0 {
             let slot = bits.trailing_zeros() as usize;
@@ -224,7 +255,8 @@ pub(super) fn of_view(
                         footprint.extent_px(lambda, outline.0.along) * holds(lambda)
                     };
                     let extents = [lo, 0.5 * (lo + hi), hi].map(extent);
-                    grown_px(outline, extents.into_iter().fold(DVec2::ZERO, DVec2::max))
+                    let most = extents.into_iter().fold(DVec2::ZERO, DVec2::max);
+                    Grown::around(outline, &corners_px, reach, most)
                 }
                 (None, None) => unreachable!("triangles have guards"),
             };
@@ -275,6 +307,17 @@ enum Grown {
 }
 
 impl Grown {
+    /// Of a cell, for splats that are so long at most along its outline's sides.
+    fn around(
+        (outline, most): &(Outline, DVec2),
+        corners_px: &[DVec3; 3],
+        reach: Reach,
+        splat_px: DVec2,
+    ) -> Self {
+        let px = splat_px.min(DVec2::splat(reach.splat)).min(*most) + reach.samples + CELL_SLACK_PX;
+        Self::Four(guard::weights_of(corners_px, outline.grown(px)))
+    }
+
     fn volume(&self, rays: &Rays) -> Volume {
         match self {
             Self::Three(margins) => Volume::Three(ViewVolume::new(&rays.grown(*margins))),

@@ -6,13 +6,13 @@ mod field;
 mod fit;
 
 use fearless_simd::dispatch;
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use self::field::{Linear, RayField, centre};
 use self::fit::{Judge, Mask, Sums};
 use super::super::FrameInput;
-use super::cameras::{CameraSettings, Top, View, of_view, starts};
+use super::cameras::{CameraSettings, Top, View, of_view, sees_objects, starts};
 use super::guard::Outline;
 use crate::camera::Eye;
 use crate::camera::three_ray::{RayScale, Rays};
@@ -63,7 +63,7 @@ pub(super) fn cells(
             |(mut field, mut groups, mut cells), i| {
                 let origin = [i % across * tile, i / across * tile];
                 groups.clear();
-                dispatch!(top.level, _simd => of_tile(frame, origin, &mut field, &mut groups));
+                dispatch!(top.level, _simd => of_tile(frame, &top, origin, &mut field, settings, &mut groups));
                 for group in &groups {
                     cells.push(frame, &top, origin, &field, group, settings);
                 }
@@ -84,16 +84,76 @@ fn index(count: usize) -> u32 {
     u32::try_from(count).expect("fewer than pixels")
 }
 
+/// Of a tile that may be one cell, rays at so many pixels along a side are enough to tell.
+const SPARSE: usize = 8;
+
+/// Some of the pixels of `shown`, spread evenly.
+fn sparse(shown: &Mask) -> Mask {
+    const COLUMNS: u32 = 0x4444_4444;
+    let step = TILE / SPARSE;
+    std::array::from_fn(|y| if y % step == step / 2 { shown[y] & COLUMNS } else { 0 })
+}
+
+/// A tile as one cell by some of its rays and all of its depths; `None` if it is none.
+#[inline(always)]
+fn at_a_glance(
+    frame: FrameInput<'_>,
+    [left, top]: [u32; 2],
+    field: &mut RayField,
+    shown: &Mask,
+) -> Option<Group> {
+    let (eye, visibility) = (frame.eye, frame.visibility);
+    let some = sparse(shown);
+    let seed = seed(&some)?;
+    field.fill(eye, frame.scene, &some);
+    let at = seed[1] * TILE + seed[0];
+    let about = [field.field[0][at], field.field[1][at], field.field[2][at], field.field[3][at]];
+    let sums = Sums::new(&field.field, about, &some);
+    let linear = sums.fit(about)?;
+    let judge = Judge::new(&linear, sums.middle(), eye.focal_px, TOLERANCE_PX);
+    if judge.accepted(&field.field, &some) != some {
+        return None;
+    }
+    let mut depth = [[0.0; TILE]; TILE];
+    let columns = (eye.size.width - left).min(TILE as u32) as usize;
+    let rows = (eye.size.height - top).min(TILE as u32) as usize;
+    for y in 0..rows {
+        let from = (top as usize + y) * eye.size.width as usize + left as usize;
+        depth[y][..columns].copy_from_slice(&visibility.mirror_depth[from..from + columns]);
+    }
+    judge
+        .accepts_depths(&depth, shown)
+        .then_some(Group { rows: *shown, known: *shown, linear })
+}
+
 /// Groups the pixels of a tile: from a seed's tangent grows what one linear function describes.
 #[inline(always)]
-fn of_tile(frame: FrameInput<'_>, origin: [u32; 2], field: &mut RayField, out: &mut Vec<Group>) {
-    let shown = field.fill(frame.eye, frame.scene, frame.visibility, origin);
-    let mut left = shown;
+fn of_tile(
+    frame: FrameInput<'_>,
+    top: &Top,
+    origin: [u32; 2],
+    field: &mut RayField,
+    settings: CameraSettings,
+    out: &mut Vec<Group>,
+) {
+    let shown = field.enter(frame.eye, frame.visibility, origin);
+    if shown == [0; TILE] {
+        return;
+    }
+    if let Some(group) = at_a_glance(frame, origin, field, &shown) {
+        let patch = group.patch(origin, field);
+        let view = group.view(frame.eye, origin, &patch, settings.ray_scale);
+        if !sees_objects(frame.eye, top, &view, settings) {
+            return;
+        }
+    }
+    field.fill(frame.eye, frame.scene, &shown);
     let focal_px = frame.eye.focal_px;
+    let mut left = shown;
     while let Some(seed) = seed(&left) {
         let at = seed[1] * TILE + seed[0];
         let about = [field.field[0][at], field.field[1][at], field.field[2][at], field.field[3][at]];
-        let tangent = field.tangent(frame.eye, frame.scene, origin, seed);
+        let tangent = field.tangent(frame.eye, frame.scene, seed);
         let center = [centre(seed[0]), centre(seed[1])];
         let growing = GROWING * TOLERANCE_PX;
         let mut linear = tangent;
@@ -142,6 +202,50 @@ fn seed(mask: &Mask) -> Option<[usize; 2]> {
     (best.0 > 0).then_some([best.1 as usize, best.2])
 }
 
+impl Group {
+    fn patch(&self, origin: [u32; 2], field: &RayField) -> Patch {
+        let all = self.rows.iter().fold(0, |all, row| all | row);
+        let used = |row: &u32| *row != 0;
+        let first = self.rows.iter().position(used).unwrap_or(0);
+        let last = self.rows.iter().rposition(used).unwrap_or(first);
+        let some = first * TILE + self.rows[first].trailing_zeros() as usize;
+        Patch {
+            triangle: MirrorTriangleIndex(field.ids[some]),
+            corners: [DVec3::X, DVec3::Y, DVec3::Z],
+            rect: PixelRect {
+                min: [origin[0] + all.trailing_zeros(), origin[1] + index(first)],
+                max: [origin[0] + 32 - all.leading_zeros(), origin[1] + index(last) + 1],
+            },
+            pixels: self.rows.iter().map(|row| row.count_ones()).sum(),
+            cell: None,
+            own: None,
+        }
+    }
+
+    fn view<'a>(
+        &self,
+        eye: &Eye,
+        origin: [u32; 2],
+        patch: &'a Patch,
+        scale: RayScale,
+    ) -> View<'a> {
+        let outline = outline(&self.rows, origin);
+        let plane = inverse_depth(&self.linear, origin, &outline);
+        let [a, b, _, c] = outline.grown(DVec2::ZERO);
+        let rays = construction_rays(eye, origin, [a, b, c], &self.linear, plane, scale);
+        let most = farthest(&self.linear, outline.along);
+        View { patch, rays, front: [1.0; 3], outline: Some((outline, most)) }
+    }
+
+    /// The direction of the exact ray of a pixel less that of the group's.
+    fn deviation(&self, field: &RayField, x: usize, y: usize) -> Vec3 {
+        let (cx, cy) = (centre(x), centre(y));
+        let depth = 1.0 / self.linear.get(3, cx, cy).max(f32::MIN_POSITIVE);
+        let of = |k: usize| field.field[k][y * TILE + x] - self.linear.get(k, cx, cy);
+        Vec3::new(of(0), of(1), of(2)) * depth
+    }
+}
+
 impl Cells {
     fn push(
         &mut self,
@@ -152,53 +256,27 @@ impl Cells {
         group: &Group,
         settings: CameraSettings,
     ) {
-        let all = group.rows.iter().fold(0, |all, row| all | row);
-        let used = |row: &u32| *row != 0;
-        let Some(first) = group.rows.iter().position(used) else { return };
-        let last = group.rows.iter().rposition(used).unwrap_or(first);
-        let (from, to) = (all.trailing_zeros(), 32 - all.leading_zeros());
-        let rect = PixelRect {
-            min: [origin[0] + from, origin[1] + index(first)],
-            max: [origin[0] + to, origin[1] + index(last) + 1],
-        };
-        let some = first * TILE + group.rows[first].trailing_zeros() as usize;
-        let patch = Patch {
-            triangle: MirrorTriangleIndex(field.ids[some]),
-            corners: [DVec3::X, DVec3::Y, DVec3::Z],
-            rect,
-            pixels: group.rows.iter().map(|row| row.count_ones()).sum(),
-            cell: None,
-            own: Some(OwnPixels {
-                first_row: index(self.pixels.rows.len()),
-                first_pixel: index(self.pixels.deviations.len()),
-            }),
-        };
-        let outline = outline(&group.rows, origin);
-        let plane = inverse_depth(&group.linear, origin, &outline);
-        let [a, b, _, c] = outline.grown(DVec2::ZERO);
-        let rays = construction_rays(frame.eye, origin, [a, b, c], &group.linear, plane, settings.ray_scale);
+        let mut patch = group.patch(origin, field);
+        patch.own = Some(OwnPixels {
+            first_row: index(self.pixels.rows.len()),
+            first_pixel: index(self.pixels.deviations.len()),
+        });
         let cameras = self.cameras.len();
-        let most = farthest(&group.linear, outline.along);
-        let view = View { patch: &patch, rays, front: [1.0; 3], outline: Some((outline, most)) };
+        let view = group.view(frame.eye, origin, &patch, settings.ray_scale);
         of_view(frame, top, &view, index(self.patches.len()), settings, &mut self.cameras);
-        if std::env::var_os("CELLG").is_some() && origin == [1024, 384] {
-            eprintln!("G {:?} px {} {:?} rays {:?} cams {:?}", rect, patch.pixels, group.linear, rays, self.cameras[cameras..].iter().map(|c| (c.lambda, c.several, c.camera.wide)).collect::<Vec<_>>());
-        }
         if self.cameras.len() == cameras {
             return;
         }
         self.patches.push(patch);
-        self.pixels.rows.extend(group.rows[first..=last].iter().map(|row| row >> from));
-        for y in first..=last {
+        let [from, first] = [0, 1].map(|k| (patch.rect.min[k] - origin[k]) as usize);
+        let [to, end] = [0, 1].map(|k| (patch.rect.max[k] - origin[k]) as usize);
+        self.pixels.rows.extend(group.rows[first..end].iter().map(|row| row >> from));
+        for y in first..end {
             let begin = self.pixels.deviations.len();
             let mut last_known = [0.0; 3];
-            for x in from as usize..to as usize {
+            for x in from..to {
                 if (group.rows[y] | group.known[y]) >> x & 1 != 0 {
-                    let (cx, cy) = (centre(x), centre(y));
-                    let depth = 1.0 / group.linear.get(3, cx, cy).max(f32::MIN_POSITIVE);
-                    last_known = [0, 1, 2].map(|k| {
-                        (field.field[k][y * TILE + x] - group.linear.get(k, cx, cy)) * depth
-                    });
+                    last_known = group.deviation(field, x, y).to_array();
                     if x > 0 && (group.rows[y] | group.known[y]) << (32 - x) == 0 {
                         self.pixels.deviations[begin..].fill(last_known);
                     }

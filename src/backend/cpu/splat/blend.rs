@@ -10,6 +10,9 @@ use super::{BORDER, EMPTY};
 /// add up everywhere (untuned).
 const GAIN: f32 = 1.3;
 
+/// From this coverage on a gap between covered pixels is closed (untuned).
+const CLOSING: f32 = 0.4;
+
 /// One patch's pixels, by slot of its tile.
 #[derive(Default)]
 pub(super) struct Layers {
@@ -35,7 +38,7 @@ impl Layers {
             let surfel = hits.surfel[i];
             let color = radiance[surfel as usize].extend(1.0);
             let key = next & !u64::from(u32::MAX) | u64::from(surfel);
-            let weight = hits.ellipse[WEIGHT][i] * crate::geometry::lanes::tune(0);
+            let weight = hits.ellipse[WEIGHT][i] * GAIN;
             hits.each(i, stride, tile.len(), |slot, kernel| {
                 let sum = &mut self.sum[slot];
                 if sum.w < 1.0 {
@@ -48,9 +51,17 @@ impl Layers {
         }
     }
 
-    /// Radiance, weighted by coverage, and coverage of a slot.
-    pub(super) fn at(&self, slot: usize) -> Vec4 {
-        self.sum[slot]
+    /// Radiance, weighted by coverage, and coverage of a slot. Where splats leave a part open between two pixels that
+    /// are covered, they lie too far apart there: it is closed. Edges stay.
+    pub(super) fn at(&self, slot: usize, stride: usize) -> Vec4 {
+        let own = self.sum[slot];
+        if own.w >= 1.0 || own.w < CLOSING {
+            return own;
+        }
+        let [left, right, above, below] =
+            [slot - 1, slot + 1, slot - stride, slot + stride].map(|i| self.sum[i].w);
+        let covered = left.min(right).max(above.min(below)).max(own.w);
+        own * (covered / own.w)
     }
 }
 

@@ -22,27 +22,27 @@ struct Kernel<R> {
 }
 
 /// The kernel of a disk is so many times as wide as the disk that holds a surfel (untuned).
-const SPREAD: f32 = 1.0;
+const SPREAD: f32 = 1.3;
 /// Radius of the kernel of a point, in samples: what a pixel sees of it (untuned).
-const PIXEL: f32 = 1.0;
+const PIXEL: f32 = 0.7;
 
 impl<R: Real<Scalar = f32>> Kernel<R> {
     /// Of the disk that holds a surfel, see [`Frame::form`].
     #[inline(always)]
     fn new([a, b, c]: [R; 3]) -> Self {
         let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
+        // Near a caustic it is larger than what is drawn of it: that is to count for all of it.
+        let most = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least * least));
         let (a, c) = (a + least, c + least);
         let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
         // The disk's ellipse and the pixel's add as variances do.
-        let sp = crate::geometry::lanes::tune(1);
-        let px = crate::geometry::lanes::tune(2);
-        let spread = inverse * (sp * sp);
-        let (xx, xy, yy) = (c * spread + px * px, b * spread, a * spread + px * px);
+        let spread = inverse * (SPREAD * SPREAD);
+        let (xx, xy, yy) = (c * spread + PIXEL * PIXEL, b * spread, a * spread + PIXEL * PIXEL);
         let per_det = a.splat(1.0) / (xx * yy - xy * xy);
         Self {
             form: [yy * per_det, xy * per_det, xx * per_det],
             half: [xx.sqrt(), yy.sqrt()],
-            weight: (inverse * per_det).sqrt() * (3.0 * PER_DISK),
+            weight: (most * per_det).sqrt() * (3.0 * PER_DISK),
         }
     }
 }

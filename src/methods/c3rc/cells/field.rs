@@ -54,6 +54,8 @@ pub(super) struct RayField {
     pub(super) field: [[f32; AREA]; 4],
     pub(super) ids: [u32; AREA],
     view: Linear<3>,
+    /// Of the tile, in pixels.
+    middle: [f32; 2],
     facets: [Facet; FACETS],
 }
 
@@ -64,16 +66,16 @@ impl RayField {
             field: [[0.0; AREA]; 4],
             ids: [NONE_ID; AREA],
             view: Linear::default(),
+            middle: [0.0; 2],
             facets: [facet; FACETS],
         })
     }
 
-    /// Fills in the tile whose first pixel is (`left`, `top`); returns by row which pixels show a mirror.
+    /// Goes to the tile whose first pixel is (`left`, `top`); returns by row which pixels show a mirror.
     #[inline(always)]
-    pub(super) fn fill(
+    pub(super) fn enter(
         &mut self,
         eye: &Eye,
-        scene: &PreparedScene,
         visibility: &Visibility,
         [left, top]: [u32; 2],
     ) -> [u32; TILE] {
@@ -104,26 +106,30 @@ impl RayField {
         for i in 0..FACETS {
             self.facets[i].id = NONE_ID;
         }
-        for y in 0..rows {
-            let mut x = 0;
-            while x < columns {
-                let id = self.ids[y * TILE + x];
-                let from = x;
-                while x < columns && self.ids[y * TILE + x] == id {
+        self.middle = middle;
+        shown
+    }
+
+    /// Fills in the rays of the pixels of `mask`, of which all must show a mirror.
+    #[inline(always)]
+    pub(super) fn fill(&mut self, eye: &Eye, scene: &PreparedScene, mask: &[u32; TILE]) {
+        for y in 0..TILE {
+            let mut left = mask[y];
+            while left != 0 {
+                let from = left.trailing_zeros() as usize;
+                let id = self.ids[y * TILE + from];
+                let facet = self.facet(eye, scene, id);
+                let [a, b, c, q] = &mut self.field;
+                let mut x = from;
+                while x < TILE && left >> x & 1 != 0 && self.ids[y * TILE + x] == id {
+                    let ray = reflected(&self.view, &facet, centre(x), centre(y));
+                    let i = y * TILE + x;
+                    (a[i], b[i], c[i], q[i]) = (ray[0], ray[1], ray[2], ray[3]);
+                    left &= !(1 << x);
                     x += 1;
-                }
-                if id != NONE_ID {
-                    let facet = self.facet(eye, scene, id, middle);
-                    let [a, b, c, q] = &mut self.field;
-                    for x in from..x {
-                        let ray = reflected(&self.view, &facet, centre(x), centre(y));
-                        let i = y * TILE + x;
-                        (a[i], b[i], c[i], q[i]) = (ray[0], ray[1], ray[2], ray[3]);
-                    }
                 }
             }
         }
-        shown
     }
 
     /// The field about a pixel as its own triangle continues it.
@@ -131,12 +137,9 @@ impl RayField {
         &mut self,
         eye: &Eye,
         scene: &PreparedScene,
-        [left, top]: [u32; 2],
         [x, y]: [usize; 2],
     ) -> Linear<4> {
-        let half = TILE as f32 * 0.5;
-        let middle = [left as f32 + half, top as f32 + half];
-        let facet = self.facet(eye, scene, self.ids[y * TILE + x], middle);
+        let facet = self.facet(eye, scene, self.ids[y * TILE + x]);
         let (x, y) = (centre(x), centre(y));
         let at = |dx: f32, dy: f32| reflected(&self.view, &facet, x + dx, y + dy);
         let [a, b, c, d] = [at(-0.5, 0.0), at(0.5, 0.0), at(0.0, -0.5), at(0.0, 0.5)];
@@ -150,7 +153,8 @@ impl RayField {
         tangent
     }
 
-    fn facet(&mut self, eye: &Eye, scene: &PreparedScene, id: u32, middle: [f32; 2]) -> Facet {
+    fn facet(&mut self, eye: &Eye, scene: &PreparedScene, id: u32) -> Facet {
+        let middle = self.middle;
         let slot = id as usize % FACETS;
         if self.facets[slot].id != id {
             self.facets[slot] = Facet { id, normal_and_inverse: of_triangle(eye, scene, id, middle) };

@@ -196,4 +196,23 @@ impl Judge {
         }
         near
     }
+
+    /// Whether the mirror's points at all pixels of `mask` are near enough. `depth`: of the tile's rows, along the eye's
+    /// `forward`.
+    #[inline(always)]
+    pub(super) fn accepts_depths(&self, depth: &[[f32; TILE]; TILE], mask: &Mask) -> bool {
+        let l = &self.linear;
+        for y in 0..TILE {
+            let cy = centre(y);
+            let mut most = 0.0f32;
+            for i in 0..TILE {
+                let apart = (depth[y][i] * l.get(3, centre(i), cy) - 1.0).abs();
+                most = most.max(if mask[y] >> i & 1 != 0 { apart } else { 0.0 });
+            }
+            if most > self.depth {
+                return false;
+            }
+        }
+        true
+    }
 }
