@@ -23,6 +23,12 @@ use crate::visibility::{MirrorTriangleIndex, OwnPixels, Patch, PixelRect};
 const TILE: usize = 32;
 /// How far a ray of a cell may lie from its camera's, in pixels (untuned).
 pub(super) const TOLERANCE_PX: f32 = 1.0;
+/// How far points of the mirror may lie from a cell's plane, in pixels (untuned).
+const SURFACE_TOLERANCE_PX: f32 = 2.0;
+/// What a tile sees is bounded by a fit to its rays that is no farther off than this, in pixels.
+const GLANCE_PX: f32 = 12.0;
+/// How much farther off the rays may be that were not looked at.
+const UNSEEN: f32 = 1.5;
 /// How much farther a ray may lie while its cell grows (untuned).
 const GROWING: f32 = 1.5;
 /// How much farther the exact rays of other pixels may lie to go on from those of a cell (untuned).
@@ -94,36 +100,47 @@ fn sparse(shown: &Mask) -> Mask {
     std::array::from_fn(|y| if y % step == step / 2 { shown[y] & COLUMNS } else { 0 })
 }
 
-/// A tile as one cell by some of its rays and all of its depths; `None` if it is none.
+/// Whether a tile sees no object, by some of its rays and all of its depths.
 #[inline(always)]
-fn at_a_glance(
+fn sees_nothing(
     frame: FrameInput<'_>,
-    [left, top]: [u32; 2],
+    top: &Top,
+    origin: [u32; 2],
     field: &mut RayField,
     shown: &Mask,
-) -> Option<Group> {
+    settings: CameraSettings,
+) -> bool {
     let (eye, visibility) = (frame.eye, frame.visibility);
     let some = sparse(shown);
-    let seed = seed(&some)?;
+    let Some(seed) = seed(&some) else { return false };
     field.fill(eye, frame.scene, &some);
-    let at = seed[1] * TILE + seed[0];
-    let about = [field.field[0][at], field.field[1][at], field.field[2][at], field.field[3][at]];
+    let about = field.at(seed);
     let sums = Sums::new(&field.field, about, &some);
-    let linear = sums.fit(about)?;
-    let judge = Judge::new(&linear, sums.middle(), eye.focal_px, TOLERANCE_PX);
-    if judge.accepted(&field.field, &some) != some {
-        return None;
+    let Some(linear) = sums.fit(about) else { return false };
+    let judge = Judge::new(&linear, sums.middle(), eye.focal_px, GLANCE_PX, GLANCE_PX);
+    let slack = judge.farthest(&field.field, &some);
+    if slack > GLANCE_PX {
+        return false;
     }
     let mut depth = [[0.0; TILE]; TILE];
-    let columns = (eye.size.width - left).min(TILE as u32) as usize;
-    let rows = (eye.size.height - top).min(TILE as u32) as usize;
-    for y in 0..rows {
-        let from = (top as usize + y) * eye.size.width as usize + left as usize;
-        depth[y][..columns].copy_from_slice(&visibility.mirror_depth[from..from + columns]);
+    let [left, first] = origin.map(|v| v as usize);
+    let columns = (eye.size.width as usize - left).min(TILE);
+    let rows = (eye.size.height as usize - first).min(TILE);
+    for (y, row) in depth[..rows].iter_mut().enumerate() {
+        let from = (first + y) * eye.size.width as usize + left;
+        row[..columns].copy_from_slice(&visibility.mirror_depth[from..from + columns]);
     }
-    judge
-        .accepts_depths(&depth, shown)
-        .then_some(Group { rows: *shown, known: *shown, linear })
+    if !judge.accepts_depths(&depth, shown) {
+        return false;
+    }
+    let group = Group { rows: *shown, known: *shown, linear };
+    let patch = group.patch(origin, field);
+    let mut view = group.view(eye, origin, &patch, settings.ray_scale);
+    let slack = f64::from(slack * UNSEEN);
+    view.outline = view.outline.map(|(outline, most)| {
+        (Outline { half: outline.half + slack, ..outline }, most)
+    });
+    !sees_objects(eye, top, &view, settings)
 }
 
 /// Groups the pixels of a tile: from a seed's tangent grows what one linear function describes.
@@ -140,29 +157,24 @@ fn of_tile(
     if shown == [0; TILE] {
         return;
     }
-    if let Some(group) = at_a_glance(frame, origin, field, &shown) {
-        let patch = group.patch(origin, field);
-        let view = group.view(frame.eye, origin, &patch, settings.ray_scale);
-        if !sees_objects(frame.eye, top, &view, settings) {
-            return;
-        }
+    if sees_nothing(frame, top, origin, field, &shown, settings) {
+        return;
     }
     field.fill(frame.eye, frame.scene, &shown);
     let focal_px = frame.eye.focal_px;
     let mut left = shown;
     while let Some(seed) = seed(&left) {
-        let at = seed[1] * TILE + seed[0];
-        let about = [field.field[0][at], field.field[1][at], field.field[2][at], field.field[3][at]];
+        let about = field.at(seed);
         let tangent = field.tangent(frame.eye, frame.scene, seed);
         let center = [centre(seed[0]), centre(seed[1])];
         let growing = GROWING * TOLERANCE_PX;
         let mut linear = tangent;
-        let mut near = Judge::new(&tangent, center, focal_px, growing).accepted(&field.field, &left);
+        let mut near = Judge::new(&tangent, center, focal_px, growing, SURFACE_TOLERANCE_PX).accepted(&field.field, &left);
         for round in 0..ROUNDS {
             let sums = Sums::new(&field.field, about, &near);
             let Some(better) = sums.fit(about) else { break };
             let tolerance = if round + 1 < ROUNDS { growing } else { TOLERANCE_PX };
-            let judge = Judge::new(&better, sums.middle(), focal_px, tolerance);
+            let judge = Judge::new(&better, sums.middle(), focal_px, tolerance, SURFACE_TOLERANCE_PX);
             let grown = judge.accepted(&field.field, &left);
             let same = grown == near;
             (linear, near) = (better, grown);
@@ -172,13 +184,13 @@ fn of_tile(
         }
         if near[seed[1]] >> seed[0] & 1 == 0 {
             linear = tangent;
-            near = Judge::new(&tangent, center, focal_px, TOLERANCE_PX).accepted(&field.field, &left);
+            near = Judge::new(&tangent, center, focal_px, TOLERANCE_PX, SURFACE_TOLERANCE_PX).accepted(&field.field, &left);
             near[seed[1]] |= 1 << seed[0];
         }
         for y in 0..TILE {
             left[y] &= !near[y];
         }
-        let judge = Judge::new(&linear, center, focal_px, NEIGHBOURS * TOLERANCE_PX);
+        let judge = Judge::new(&linear, center, focal_px, NEIGHBOURS * TOLERANCE_PX, SURFACE_TOLERANCE_PX);
         let known = judge.accepted(&field.field, &shown);
         out.push(Group { rows: near, known, linear });
     }

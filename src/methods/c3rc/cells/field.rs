@@ -132,6 +132,13 @@ impl RayField {
         }
     }
 
+    /// The field at a pixel.
+    #[inline(always)]
+    pub(super) fn at(&self, [x, y]: [usize; 2]) -> [f32; 4] {
+        let at = y * TILE + x;
+        [self.field[0][at], self.field[1][at], self.field[2][at], self.field[3][at]]
+    }
+
     /// The field about a pixel as its own triangle continues it.
     pub(super) fn tangent(
         &mut self,

@@ -22,55 +22,72 @@ pub(super) struct Sums {
 /// The least variance of positions from which a slope is derived, in squared pixels.
 const LEAST_VARIANCE: f64 = 0.3;
 
+#[inline(always)]
+fn total(mut columns: [f32; TILE]) -> f32 {
+    let mut half = TILE / 2;
+    while half > 0 {
+        for i in 0..half {
+            columns[i] += columns[i + half];
+        }
+        half /= 2;
+    }
+    columns[0]
+}
+
+/// The total of the columns' values times a power of their positions.
+#[inline(always)]
+fn along(columns: &[f32; TILE], power: u32) -> f32 {
+    let mut moved = *columns;
+    for _ in 0..power {
+        for i in 0..TILE {
+            moved[i] *= centre(i);
+        }
+    }
+    total(moved)
+}
+
 impl Sums {
     /// Over the pixels of `mask`. `about`: subtracted from the values.
     #[inline(always)]
     pub(super) fn new(field: &[[f32; AREA]; 4], about: [f32; 4], mask: &Mask) -> Self {
-        let mut s = Self::default();
-        let mut lanes = [[0.0f32; TILE]; 8];
+        // By column; no sum runs along a row, so that the compiler can take all columns at once.
+        let (mut n, mut ny, mut nyy) = ([0.0f32; TILE], [0.0f32; TILE], [0.0f32; TILE]);
+        let (mut f, mut fy) = ([[0.0f32; TILE]; 4], [[0.0f32; TILE]; 4]);
         for y in 0..TILE {
             let bits = mask[y];
             if bits == 0 {
                 continue;
             }
             let cy = centre(y);
-            let (mut count, mut fy) = ([0.0f32; TILE], [[0.0f32; TILE]; 4]);
+            let mut own = [0.0f32; TILE];
             for i in 0..TILE {
-                count[i] = if bits >> i & 1 != 0 { 1.0 } else { 0.0 };
+                own[i] = if bits >> i & 1 != 0 { 1.0 } else { 0.0 };
+                n[i] += own[i];
+                ny[i] += own[i] * cy;
+                nyy[i] += own[i] * (cy * cy);
             }
             for k in 0..4 {
                 let values = &field[k][y * TILE..(y + 1) * TILE];
                 for i in 0..TILE {
-                    fy[k][i] = if count[i] > 0.0 { values[i] - about[k] } else { 0.0 };
+                    let value = if own[i] > 0.0 { values[i] - about[k] } else { 0.0 };
+                    f[k][i] += value;
+                    fy[k][i] += cy * value;
                 }
-            }
-            // Sums by column; the columns' positions come in at the end.
-            for i in 0..TILE {
-                lanes[0][i] += count[i];
-                lanes[1][i] += count[i] * cy;
-            }
-            let n = bits.count_ones() as f32;
-            s.yy += cy * cy * n;
-            for k in 0..4 {
-                let mut sum = 0.0;
-                for i in 0..TILE {
-                    lanes[2 + k][i] += fy[k][i];
-                    sum += fy[k][i];
-                }
-                s.yf[k] += cy * sum;
             }
         }
-        for i in 0..TILE {
-            let cx = centre(i);
-            s.count += lanes[0][i];
-            s.x += cx * lanes[0][i];
-            s.xx += cx * cx * lanes[0][i];
-            s.y += lanes[1][i];
-            s.xy += cx * lanes[1][i];
-            for k in 0..4 {
-                s.f[k] += lanes[2 + k][i];
-                s.xf[k] += cx * lanes[2 + k][i];
-            }
+        let mut s = Self {
+            count: total(n),
+            x: along(&n, 1),
+            y: total(ny),
+            xx: along(&n, 2),
+            xy: along(&ny, 1),
+            yy: total(nyy),
+            ..Self::default()
+        };
+        for k in 0..4 {
+            s.f[k] = total(f[k]);
+            s.xf[k] = along(&f[k], 1);
+            s.yf[k] = total(fy[k]);
         }
         s
     }
@@ -129,19 +146,19 @@ pub(super) struct Judge {
 const AHEAD: f32 = 0.75;
 
 
-/// How far points of the mirror may lie from the linear function's, in pixels (untuned).
-const SURFACE_TOLERANCE_PX: f32 = 2.0;
 /// Where rays change much less across one direction of the picture than across the other, a difference in that
 /// direction counts no more than this share says.
 const FLATTEST: f32 = 3e-4;
 
 impl Judge {
-    /// About a position in the tile. `focal_px`: of the eye. `tolerance`: in pixels.
+    /// About a position in the tile. `focal_px`: of the eye. `tolerance`: in pixels; `surface_tolerance`: the same for
+    /// the mirror's points.
     pub(super) fn new(
         linear: &Linear<4>,
         [x, y]: [f32; 2],
         focal_px: f32,
         tolerance: f32,
+        surface_tolerance: f32,
     ) -> Self {
         let d = Vec3::new(linear.get(0, x, y), linear.get(1, x, y), linear.get(2, x, y));
         let [r0, r1, r2, _] = linear.right;
@@ -155,7 +172,7 @@ impl Judge {
             linear: *linear,
             to_px: [((r * bb - b * rb) / det).to_array(), ((b * rr - r * rb) / det).to_array()],
             accepted: tolerance * tolerance,
-            depth: SURFACE_TOLERANCE_PX / focal_px,
+            depth: surface_tolerance / focal_px,
             ahead: d.to_array(),
             least: AHEAD * d.length_squared(),
         }
@@ -165,29 +182,11 @@ impl Judge {
     #[inline(always)]
     pub(super) fn accepted(&self, field: &[[f32; AREA]; 4], mask: &Mask) -> Mask {
         let mut near = *mask;
-        let l = &self.linear;
-        let [u, v] = &self.to_px;
         for y in 0..TILE {
             if near[y] == 0 {
                 continue;
             }
-            let cy = centre(y);
-            let row = y * TILE..(y + 1) * TILE;
-            let (a, b) = (&field[0][row.clone()], &field[1][row.clone()]);
-            let (c, q) = (&field[2][row.clone()], &field[3][row]);
-            let mut far = [0.0f32; TILE];
-            for i in 0..TILE {
-                let x = centre(i);
-                let e =
-                    [a[i] - l.get(0, x, cy), b[i] - l.get(1, x, cy), c[i] - l.get(2, x, cy)];
-                let du = u[0] * e[0] + u[1] * e[1] + u[2] * e[2];
-                let dv = v[0] * e[0] + v[1] * e[1] + v[2] * e[2];
-                let inverse = l.get(3, x, cy);
-                let apart = (q[i] - inverse).abs() - inverse * self.depth;
-                let h = &self.ahead;
-                let turned = self.least - (a[i] * h[0] + b[i] * h[1] + c[i] * h[2]);
-                far[i] = if apart.max(turned) > 0.0 { f32::MAX } else { du * du + dv * dv };
-            }
+            let far = self.row(field, y);
             let mut bits = 0u32;
             for i in 0..TILE {
                 bits |= u32::from(far[i] <= self.accepted) << i;
@@ -197,6 +196,47 @@ impl Judge {
         near
     }
 
+    /// The largest distance of a ray of `mask`, in pixels; infinite if one is turned away or starts elsewhere.
+    #[inline(always)]
+    pub(super) fn farthest(&self, field: &[[f32; AREA]; 4], mask: &Mask) -> f32 {
+        let mut most = [0.0f32; TILE];
+        for y in 0..TILE {
+            if mask[y] == 0 {
+                continue;
+            }
+            let far = self.row(field, y);
+            for i in 0..TILE {
+                let own = if mask[y] >> i & 1 != 0 { far[i] } else { 0.0 };
+                most[i] = if own > most[i] { own } else { most[i] };
+            }
+        }
+        most.iter().fold(0.0f32, |a, &b| a.max(b)).sqrt()
+    }
+
+    /// Squared distances of a row's rays, in pixels; infinite where one is turned away or starts elsewhere.
+    #[inline(always)]
+    fn row(&self, field: &[[f32; AREA]; 4], y: usize) -> [f32; TILE] {
+        let l = &self.linear;
+        let [u, v] = &self.to_px;
+        let cy = centre(y);
+        let row = y * TILE..(y + 1) * TILE;
+        let (a, b) = (&field[0][row.clone()], &field[1][row.clone()]);
+        let (c, q) = (&field[2][row.clone()], &field[3][row]);
+        let mut far = [0.0f32; TILE];
+        for i in 0..TILE {
+            let x = centre(i);
+            let e = [a[i] - l.get(0, x, cy), b[i] - l.get(1, x, cy), c[i] - l.get(2, x, cy)];
+            let du = u[0] * e[0] + u[1] * e[1] + u[2] * e[2];
+            let dv = v[0] * e[0] + v[1] * e[1] + v[2] * e[2];
+            let inverse = l.get(3, x, cy);
+            let apart = (q[i] - inverse).abs() - inverse * self.depth;
+            let h = &self.ahead;
+            let turned = self.least - (a[i] * h[0] + b[i] * h[1] + c[i] * h[2]);
+            far[i] = if apart.max(turned) > 0.0 { f32::INFINITY } else { du * du + dv * dv };
+        }
+        far
+    }
+
     /// Whether the mirror's points at all pixels of `mask` are near enough. `depth`: of the tile's rows, along the eye's
     /// `forward`.
     #[inline(always)]
@@ -204,12 +244,12 @@ impl Judge {
         let l = &self.linear;
         for y in 0..TILE {
             let cy = centre(y);
-            let mut most = 0.0f32;
+            let mut far = 0u32;
             for i in 0..TILE {
                 let apart = (depth[y][i] * l.get(3, centre(i), cy) - 1.0).abs();
-                most = most.max(if mask[y] >> i & 1 != 0 { apart } else { 0.0 });
+                far |= u32::from(apart > self.depth) << i;
             }
-            if most > self.depth {
+            if far & mask[y] != 0 {
                 return false;
             }
         }
