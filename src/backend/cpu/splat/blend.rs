@@ -4,7 +4,7 @@
 use glam::{Vec3, Vec4};
 
 use super::hits::Hits;
-use super::{BORDER, EMPTY};
+use super::EMPTY;
 
 /// How much of a pixel splats cover for each part that their areas say: they are not spread so evenly that the areas
 /// add up everywhere (untuned).
@@ -20,6 +20,8 @@ pub(super) struct Layers {
     order: Vec<u64>,
     /// Radiance times coverage, and coverage.
     sum: Vec<Vec4>,
+    /// First and last column to be drawn, by row; reversed where there is none.
+    spans: Vec<[f32; 2]>,
 }
 
 impl Layers {
@@ -28,6 +30,13 @@ impl Layers {
     pub(super) fn draw(&mut self, hits: &Hits, radiance: &[Vec3], stride: usize, tile: &mut [u64]) {
         self.sum.clear();
         self.sum.extend(tile.iter().map(|&key| if key == EMPTY { Vec4::ZERO } else { Vec4::W }));
+        self.spans.clear();
+        self.spans.extend(tile.chunks_exact(stride).map(|row| {
+            let own = |key: &u64| *key == EMPTY;
+            let first = row.iter().position(own).unwrap_or(stride);
+            let last = row.iter().rposition(own).unwrap_or(0);
+            [first as f32, last as f32]
+        }));
         self.order.clear();
         let depths = hits.depth[..hits.len].iter().zip(0u32..);
         self.order.extend(depths.map(|(d, i)| u64::from(d.to_bits()) << 32 | u64::from(i)));
@@ -39,7 +48,7 @@ impl Layers {
             let color = radiance[surfel as usize].extend(1.0);
             let key = next & !u64::from(u32::MAX) | u64::from(surfel);
             let weight = hits.ellipse[WEIGHT][i] * GAIN;
-            hits.each(i, stride, tile.len(), |slot, kernel| {
+            each(hits, i, stride, &self.spans, |slot, kernel| {
                 let sum = &mut self.sum[slot];
                 if sum.w < 1.0 {
                     if sum.w == 0.0 {
@@ -68,34 +77,40 @@ impl Layers {
 /// Index of a splat's weight in [`Hits::ellipse`].
 const WEIGHT: usize = 7;
 
-impl Hits {
-    /// Calls `touch` with every slot of the tile that a splat reaches, and its kernel there.
-    #[inline(always)]
-    fn each(&self, i: usize, stride: usize, len: usize, mut touch: impl FnMut(usize, f32)) {
-        let border = BORDER as usize;
-        // The last column and row within the border.
-        let [right, bottom] = [stride, len / stride].map(|n| (n - border - 1) as f32);
-        let left = BORDER as f32;
-        let e = &self.ellipse;
-        let (x, y, a, b, c) = (e[0][i], e[1][i], e[2][i], e[3][i], e[4][i]);
-        let (wide, high) = (e[5][i], e[6][i]);
-        // Centres of samples lie half a sample behind their index. Not negative: casts truncate, which is floor.
+/// Calls `touch` with every slot within `spans` (by row) that a splat reaches, and its kernel there.
+#[inline(always)]
+fn each(
+    hits: &Hits,
+    i: usize,
+    stride: usize,
+    spans: &[[f32; 2]],
+    mut touch: impl FnMut(usize, f32),
+) {
+    let e = &hits.ellipse;
+    let (x, y, a, b, c) = (e[0][i], e[1][i], e[2][i], e[3][i], e[4][i]);
+    let high = e[6][i];
+    // Centres of samples lie half a sample behind their index. Not negative: casts truncate, which is floor.
+    let first = (y - high - 0.5).ceil().max(0.0);
+    let last = (y + high - 0.5).min(spans.len() as f32 - 1.0);
+    let inverse = 1.0 / a;
+    let mut row = first;
+    while row <= last {
+        let dy = row + 0.5 - y;
+        let (slope, rest) = (2.0 * b * dy, c * dy * dy);
+        // Between the roots of 1 = a dx² + slope dx + rest.
+        let middle = -0.5 * slope * inverse;
+        let half = ((1.0 - rest) * inverse + middle * middle).max(0.0).sqrt();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "see above")]
-        let range = |at: f32, reach: f32, end: f32| {
-            let (from, to) = ((at - reach - 0.5).ceil().max(left), (at + reach - 0.5).min(end));
-            if from <= to { from as usize..to as usize + 1 } else { 0..0 }
-        };
-        let columns = range(x, wide, right);
-        for row in range(y, high, bottom) {
-            let dy = row as f32 + 0.5 - y;
-            let (slope, rest) = (2.0 * b * dy, c * dy * dy);
-            for column in columns.clone() {
-                let dx = column as f32 + 0.5 - x;
-                let inside = 1.0 - (dx * (a * dx + slope) + rest);
-                if inside > 0.0 {
-                    touch(row * stride + column, inside * inside);
-                }
-            }
+        let [left, right] = spans[row as usize];
+        let mut column = (x + middle - half - 0.5).ceil().max(left);
+        let end = (x + middle + half - 0.5).min(right);
+        while column <= end {
+            let dx = column + 0.5 - x;
+            let inside = (1.0 - (dx * (a * dx + slope) + rest)).max(0.0);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "see above")]
+            touch(row as usize * stride + column as usize, inside * inside);
+            column += 1.0;
         }
+        row += 1.0;
     }
 }
