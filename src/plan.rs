@@ -22,19 +22,19 @@ pub struct CameraInstance {
     pub direction: [[f32; 3]; 3],
     /// From the object's directions to the scene's, by row.
     pub rotation: [[f32; 3]; 3],
-    /// Homogeneous screen coordinates (x·w, y·w, w) relative to the patch's rectangle, in samples, linear in (b2, b3).
+    /// Homogeneous screen coordinates (x·w, y·w, w) relative to the patch's rectangle, in pixels, linear in (b2, b3).
     pub screen: [[f32; 3]; 3],
-    /// How the point at λ moves in scene space with the place on the screen that sees it, a sample to the right and a
-    /// sample down: `per_sample[0]` + λ `per_sample[1]`. The unit is the distance within which every point of the object's
+    /// How the point at λ moves in scene space with the place on the screen that sees it, a pixel to the right and a
+    /// pixel down: `per_px[0]` + λ `per_px[1]`. The unit is the distance within which every point of the object's
     /// surface has a surfel; 0 if that is not known, not numbers if the triangle has no area on the screen.
-    pub per_sample: [[[f32; 3]; 2]; 2],
+    pub per_px: [[[f32; 3]; 2]; 2],
     /// Where the rays go, if what faces away from all of them is hidden.
     pub gaze: Option<Gaze>,
     /// The object's first representative: surfels from there on have radii of their own.
     pub representatives: u32,
     /// A node that would be seen as less than 1/`detail` of a pixel is taken as one representative; 0: no node is.
     pub detail: f32,
-    /// What `per_sample` is measured in, scene units.
+    /// What `per_px` is measured in, scene units.
     pub radius: f32,
     /// Radius of the disk that the object's surfels stand for; infinite if that is not known.
     pub extent: f32,
@@ -90,10 +90,10 @@ pub trait BatchSource: Send + Sync {
     fn cull(&self, camera: &CameraInstance, out: &mut Vec<Batch>);
 }
 
-/// Which samples a projected surfel covers.
+/// Which pixels a projected surfel covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplatShape {
-    /// Those that the surfel's disk is seen on.
+    /// Those that the surfel's disk is seen on, each by the part of it that the disk covers.
     Ellipse,
     /// The one that it falls on.
     Square1,
@@ -102,11 +102,11 @@ pub enum SplatShape {
     Square2,
 }
 
-/// An ellipse's half axes end at so many samples: beyond it a caustic is near, or the surfels are too few.
+/// An ellipse's half axes end at about so many pixels: beyond it a caustic is near, or the surfels are too few.
 pub const LARGEST_ELLIPSE: f32 = 8.0;
 
 impl SplatShape {
-    /// How far, along x and y, an image may lie from a sample that it covers, in samples.
+    /// How far, along x and y, an image may lie from the centre of a pixel that it covers, in pixels.
     pub fn reach(self) -> f32 {
         match self {
             Self::Ellipse => LARGEST_ELLIPSE,
@@ -115,6 +115,11 @@ impl SplatShape {
         }
     }
 }
+
+/// Surfels are so evenly spread that a disk of this many of their radii about any point of a surface holds one.
+pub const EVENNESS: f32 = 1.5;
+/// The camera of a cell of the picture may be about so many pixels beside its exact rays; see [`Pixels::deviations`].
+pub const CELL_SLACK_PX: f32 = 1.0;
 
 /// What decides which surfel is nearest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -148,10 +153,8 @@ pub struct SplatPass<'a> {
     pub patch_cameras: Vec<u32>,
     /// The culling.
     pub batches: Box<dyn BatchSource + 'a>,
-    /// Footprint, in samples.
+    /// Footprint, in pixels.
     pub shape: SplatShape,
-    /// Samples along a pixel's side: each has the nearest surfel of its own, and a pixel shows their mean.
-    pub samples: u32,
     /// Depth.
     pub depth: DepthKey,
     /// Keep only the first root that has an image, as the paper's vertex program.

@@ -69,7 +69,9 @@ impl Patch {
     /// Whether a pixel of its rectangle is the patch's own. `rows`: the masks that its `own` points into.
     pub fn owns(&self, visibility: &Visibility, rows: &[u32], x: u32, y: u32) -> bool {
         if let Some(own) = self.own {
-            return rows[(own.first_row + y - self.rect.min[1]) as usize] >> (x - self.rect.min[0]) & 1 != 0;
+            return rows[(own.first_row + y - self.rect.min[1]) as usize] >> (x - self.rect.min[0])
+                & 1
+                != 0;
         }
         visibility.mirror_ids[(y * visibility.size.width + x) as usize] == self.triangle.0
             && self.cell.is_none_or(|cell| cell.contains(x, y))

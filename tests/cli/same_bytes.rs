@@ -45,7 +45,12 @@ fn by_three_ray_cameras() {
 
 #[test]
 fn with_level_of_detail() {
-    same("c3rc --splat ellipse --detail 4 --samples 2");
+    same("c3rc --splat ellipse --detail 4");
+}
+
+#[test]
+fn with_cells() {
+    same("c3rc --preset smooth");
 }
 
 #[test]

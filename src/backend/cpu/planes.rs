@@ -116,9 +116,8 @@ fn of_patch(
                     least = apart;
                     let [x, y, _] = work.place(image, 0.0);
                     seen.lambda = image.lambda;
-                    let to_px = 1.0 / pass.samples as f32;
                     let [left, top] = patch.rect.min.map(|v| v as f32);
-                    seen.splat = [x * to_px + left, y * to_px + top];
+                    seen.splat = [x + left, y + top];
                 }
             }
             list.push(seen);

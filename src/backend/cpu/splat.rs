@@ -1,5 +1,5 @@
 //! The splat pass on the CPU: a patch is a task. Its tile of depth|surfel keys lies in the innermost cache; a
-//! key of 0 marks samples of others, so that one comparison decides ownership and depth. The task ends with its
+//! key of 0 marks pixels of others, so that one comparison decides ownership and depth. The task ends with its
 //! pixels' colours, so that no picture of keys is ever written.
 
 mod blend;
@@ -79,11 +79,11 @@ impl SplatCounters {
 pub(crate) struct Landed {
     /// Which, by row.
     pub(crate) pixel: u32,
-    /// Share of its samples that are covered.
+    /// Share of it that is covered.
     pub(crate) coverage: f32,
-    /// Mean of the surfels' radiance over all samples, 0 where nothing landed.
+    /// Of the surfels, times the coverage.
     pub(crate) radiance: Vec3,
-    /// The nearest key of its samples.
+    /// The nearest key.
     pub(crate) key: u64,
 }
 
@@ -134,7 +134,7 @@ impl PatchWork<'_> {
         let Self { pass, surfels, visibility, index, level, pool } = *self;
         let mut counters = SplatCounters::default();
         let patch = &pass.patches[index];
-        let stride = patch.rect.width() * pass.samples + 2 * BORDER;
+        let stride = patch.rect.width() + 2 * BORDER;
         let cameras = pass.patch_cameras[index] as usize..pass.patch_cameras[index + 1] as usize;
         if cameras.is_empty() {
             return counters;
@@ -142,38 +142,17 @@ impl PatchWork<'_> {
         let Scratch { batches, packed, hits, tile, layers } = scratch;
         hits.len = 0;
         fill_tile(tile, pass, patch, visibility);
-        let cameras_n = cameras.len();
         for camera in &pass.cameras[cameras] {
             let start = Instant::now();
             batches.clear();
             pass.batches.cull(camera, batches);
             counters.cull_ns += nanoseconds(start, Instant::now());
             counters.batches += batches.len() as u64;
-            if std::env::var_os("CELLR").is_some() {
-                eprintln!("R {} {} {} {} {} {}", patch.pixels, patch.rect.width(), patch.rect.height(), batches.iter().map(|b| b.count).sum::<u32>(), batches.len(), camera.object);
-            }
             let work = Projection { pass, surfels, camera, patch, stride };
             let shared = Shared { work, visibility, level, pool };
             counters = counters.plus(shared.project(batches, packed, hits, tile));
         }
         let start = Instant::now();
-        if let Ok(v) = std::env::var("PX") {
-            let v: Vec<u32> = v.split(',').map(|x| x.parse().unwrap()).collect();
-            if v[0] >= patch.rect.min[0] && v[0] < patch.rect.max[0] && v[1] >= patch.rect.min[1] && v[1] < patch.rect.max[1] && patch.owns(visibility, &pass.pixels.rows, v[0], v[1]) {
-                let e = &hits.ellipse;
-                eprintln!("patch {:?} cams {} hits {}", patch, cameras_n, hits.len);
-                let c = &pass.cameras[pass.patch_cameras[index] as usize];
-                eprintln!("lambda {:?} foot {:?}", c.lambda, c.footprint);
-                let (px, py) = ((v[0] - patch.rect.min[0]) as f32 + 1.5, (v[1] - patch.rect.min[1]) as f32 + 1.5);
-                for i in 0..hits.len {
-                    let (dx, dy) = (px - e[0][i], py - e[1][i]);
-                    let q = e[2][i]*dx*dx + 2.0*e[3][i]*dx*dy + e[4][i]*dy*dy;
-                    if true {
-                        eprintln!("hit d {dx:.2} {dy:.2} q {q:.2} form {:.3} {:.3} {:.3} half {:.2} {:.2} w {:.4} depth {:.4} surfel {}", e[2][i], e[3][i], e[4][i], e[5][i], e[6][i], e[7][i], hits.depth[i], hits.surfel[i]);
-                    }
-                }
-            }
-        }
         if pass.shape == SplatShape::Ellipse {
             layers.draw(hits, &surfels.radiance, stride as usize, tile);
         }
@@ -182,49 +161,32 @@ impl PatchWork<'_> {
         counters
     }
 
-    /// From the samples of the tile to the patch's pixels.
+    /// From the tile to the patch's pixels.
     fn resolve(&self, tile: &[u64], layers: &Layers, stride: usize, landed: &mut Vec<Landed>) {
         let rect = self.pass.patches[self.index].rect;
-        let side = self.pass.samples as usize;
-        let share = 1.0 / (side * side) as f32;
         for y in rect.min[1]..rect.max[1] {
-            let row = (y - rect.min[1]) as usize * side + BORDER as usize;
+            let row = (y - rect.min[1] + BORDER) as usize * stride + BORDER as usize;
             for x in rect.min[0]..rect.max[0] {
-                let column = (x - rect.min[0]) as usize * side + BORDER as usize;
-                let (mut key, mut count, mut radiance) = (EMPTY, 0.0, Vec3::ZERO);
-                for j in 0..side {
-                    let at = (row + j) * stride + column;
-                    for &sample in &tile[at..at + side] {
-                        if sample == EMPTY || sample == FOREIGN {
-                            continue;
-                        }
-                        key = key.min(sample);
-                        count += 1.0;
+                let slot = row + (x - rect.min[0]) as usize;
+                let key = tile[slot];
+                if key == EMPTY || key == FOREIGN {
+                    continue;
+                }
+                let value = match self.pass.shape {
+                    SplatShape::Ellipse => layers.at(slot, stride),
+                    _ => {
                         // The low half of a key is its surfel.
                         #[expect(clippy::cast_possible_truncation, reason = "takes the low half")]
-                        let surfel = sample as u32 as usize;
-                        radiance += self.surfels.radiance[surfel];
+                        let surfel = key as u32 as usize;
+                        self.surfels.radiance[surfel].extend(1.0)
                     }
-                }
-                if self.pass.shape == SplatShape::Ellipse {
-                    let at = row * stride + column;
-                    let value = layers.at(at, stride);
-                    if tile[at] != EMPTY && tile[at] != FOREIGN && value.w > 0.0 {
-                        landed.push(Landed {
-                            pixel: y * self.visibility.size.width + x,
-                            coverage: value.w,
-                            radiance: value.truncate(),
-                            key: tile[at],
-                        });
-                    }
-                } else if key != EMPTY {
-                    landed.push(Landed {
-                        pixel: y * self.visibility.size.width + x,
-                        coverage: count * share,
-                        radiance: radiance * share,
-                        key,
-                    });
-                }
+                };
+                landed.push(Landed {
+                    pixel: y * self.visibility.size.width + x,
+                    coverage: value.w,
+                    radiance: value.truncate(),
+                    key,
+                });
             }
         }
     }
@@ -319,18 +281,14 @@ impl Shared<'_> {
 }
 
 fn fill_tile(tile: &mut Vec<u64>, pass: &SplatPass<'_>, patch: &Patch, visibility: &Visibility) {
-    let side = pass.samples as usize;
-    let stride = patch.rect.width() as usize * side + 2 * BORDER as usize;
+    let stride = (patch.rect.width() + 2 * BORDER) as usize;
     tile.clear();
-    tile.resize(stride * (patch.rect.height() as usize * side + 2 * BORDER as usize), FOREIGN);
+    tile.resize(stride * (patch.rect.height() + 2 * BORDER) as usize, FOREIGN);
     for y in patch.rect.min[1]..patch.rect.max[1] {
-        let row = (y - patch.rect.min[1]) as usize * side + BORDER as usize;
+        let row = (y - patch.rect.min[1] + BORDER) as usize * stride + BORDER as usize;
         for x in patch.rect.min[0]..patch.rect.max[0] {
             if patch.owns(visibility, &pass.pixels.rows, x, y) {
-                let at = row * stride + (x - patch.rect.min[0]) as usize * side + BORDER as usize;
-                for j in 0..side {
-                    tile[at + j * stride..at + j * stride + side].fill(EMPTY);
-                }
+                tile[row + (x - patch.rect.min[0]) as usize] = EMPTY;
             }
         }
     }

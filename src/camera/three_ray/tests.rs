@@ -328,10 +328,55 @@ fn one_camera(numbers: &mut Numbers, level: Level, tests: &[BoxTest; 4]) -> [usi
     missed
 }
 
+#[test]
+fn the_volume_of_a_parallelogram_refuses_no_box_of_its_own() {
+    let mut numbers = Numbers(77);
+    let level = Level::new();
+    let tests = [BoxTest::Interval, BoxTest::Sweep, BoxTest::Slab];
+    let (mut missed, mut refused_outside) = ([0; 3], 0);
+    for _ in 0..3_000 {
+        let edge = 10f64.powf(numbers.between(-2.5, 0.0));
+        let rays = numbers.camera(edge, RayScale::EyeDistance);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let at = |s: f64, t: f64| DVec3::new(1.0 - s - t, s, t);
+        let volume = ViewVolume::<f32, 4>::new(&rays.part(corners.map(|(s, t)| at(s, t))));
+        for inside in [true, false] {
+            let (mut center, mut half) = ([[0.0f32; 8]; 3], [[0.0f32; 8]; 3]);
+            for slot in 0..8 {
+                let far = if inside { 0.0 } else { 3.0 };
+                let (v, d) = rays.at(at(numbers.next() + far, numbers.next()));
+                let point = v + d * 10f64.powf(numbers.between(-2.0, 1.3));
+                let size =
+                    edge * 10f64.powf(numbers.between(-3.0, if inside { 0.5 } else { -1.0 }));
+                let h = DVec3::new(numbers.next(), numbers.next(), numbers.next()) * size
+                    + 1e-6 * point.length();
+                let c = point + numbers.point() * h * 0.99;
+                for k in 0..3 {
+                    #[expect(clippy::cast_possible_truncation)]
+                    {
+                        center[k][slot] = (c[k] - rays.origins[0][k]) as f32;
+                        half[k][slot] = (h[k] * (1.0 + 1e-6)) as f32;
+                    }
+                }
+            }
+            for (missed, test) in missed.iter_mut().zip(tests) {
+                let n = dispatch!(level, simd => refused(simd, &volume, test, &center, &half));
+                match inside {
+                    true => *missed += n,
+                    false if test == BoxTest::Slab => refused_outside += n,
+                    false => {}
+                }
+            }
+        }
+    }
+    assert_eq!(missed, [0; 3]);
+    assert!(refused_outside > 12_000, "only {refused_outside} of 24,000 outside are refused");
+}
+
 #[inline(always)]
-fn refused<S: Simd>(
+fn refused<S: Simd, const N: usize>(
     simd: S,
-    volume: &ViewVolume<f32>,
+    volume: &ViewVolume<f32, N>,
     test: BoxTest,
     center: &[[f32; 8]; 3],
     half: &[[f32; 8]; 3],

@@ -225,6 +225,7 @@ impl<T: Scalar, const N: usize> ViewVolume<T, N> {
         Verdict::not_inside(lo, hi, lo.le(hi))
     }
 
+    #[expect(clippy::needless_range_loop, reason = "compilers see through indices best")]
     #[inline(always)]
     fn slab<R: Real<Scalar = T>>(&self, boxes: &Boxes<R>, lo: R, hi: R) -> Verdict<R> {
         let (lo, hi) = self.axis.trim(boxes, lo, hi);

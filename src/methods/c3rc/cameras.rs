@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::super::FrameInput;
 use super::footprint::Footprint;
-use super::guard::{self, Guard, MAX_GUARD, Outline, Reach};
+use super::guard::{self, Guard, MAX_GUARD, Outline};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::Eye;
 use crate::camera::RayScale;
@@ -15,7 +15,7 @@ use crate::camera::three_ray::{BoxTest, Rays, ThreeRay, ViewVolume, array};
 use crate::cull::{Tested, test_children};
 use crate::geometry::Similarity;
 use crate::geometry::lanes::simd_level;
-use crate::plan::{CameraInstance, Gaze, SplatShape, Volume};
+use crate::plan::{CELL_SLACK_PX, CameraInstance, EVENNESS, Gaze, SplatShape, Volume};
 use crate::scene::prepared::{PreparedObject, PreparedScene};
 use crate::visibility::Patch;
 
@@ -24,12 +24,8 @@ const CONTACT: f64 = 1e-5;
 /// λ ends at this many times the farthest object's distance over the shortest ray: rays interpolated much
 /// shorter than the three given ones are not followed further.
 const SHORTENING: f64 = 1e3;
-/// Surfels are so evenly spread that a disk of this many of their radii about any point of a surface holds one.
-const EVENNESS: f64 = 1.5;
 /// No camera has more than so many times the detail that was asked for (untuned).
 const MOST_DETAIL: f64 = 64.0;
-/// A cell's camera is so many pixels beside the exact rays at most.
-pub(super) const CELL_SLACK_PX: f64 = super::cells::TOLERANCE_PX as f64;
 /// For the rounding of a gaze's cosine.
 const GAZE_SLACK: f64 = 1e-5;
 
@@ -38,16 +34,13 @@ const GAZE_SLACK: f64 = 1e-5;
 pub(super) struct CameraSettings {
     pub(super) ray_scale: RayScale,
     pub(super) shape: SplatShape,
-    pub(super) samples: u32,
     pub(super) detail: f64,
 }
 
 impl CameraSettings {
-    fn reach(self) -> Reach {
-        let side = f64::from(self.samples);
-        // The outermost samples lie on a square.
-        let samples = (side - 1.0) / side * std::f64::consts::FRAC_1_SQRT_2;
-        Reach { samples, splat: f64::from(self.shape.reach()) / side }
+    /// How far a splat may lie from a pixel's centre that it covers, in pixels.
+    fn reach(self) -> f64 {
+        f64::from(self.shape.reach())
     }
 }
 
@@ -214,7 +207,6 @@ pub(super) fn of_view(
     let reach = settings.reach();
     // Most patches see no object.
     let mut exact = None;
-    let samples = f64::from(settings.samples);
     for (g, group) in top.groups.iter().enumerate() {
         let tested = bounds.test(top, group);
         let mut bits = tested.meets & group.used;
@@ -225,9 +217,10 @@ pub(super) fn of_view(
             let to_scene = &scene.objects[object].to_scene;
             let range = [tested.lo[slot], tested.hi[slot]];
             let range_f64 = range.map(f64::from);
-            let radius = EVENNESS * to_scene.scale * f64::from(scene.objects[object].extent);
+            let radius =
+                f64::from(EVENNESS) * to_scene.scale * f64::from(scene.objects[object].extent);
             let (screen, guard, footprint) = exact.get_or_insert_with(|| {
-                let screen = screen_forms(eye, patch, rays.origins, samples);
+                let screen = screen_forms(eye, patch, rays.origins);
                 let guard = match outline {
                     Some(_) => None,
                     None => Some(Guard::new(&corners_px, visibility, patch, reach)),
@@ -243,7 +236,7 @@ pub(super) fn of_view(
             // A representative's disk has the area of a share of a pixel.
             let holds = |lambda: f64| {
                 let area = if detail > 0.0 { footprint.area_per_px(lambda) / detail } else { 0.0 };
-                radius.max(EVENNESS * (area / std::f64::consts::PI).sqrt())
+                radius.max(f64::from(EVENNESS) * (area / std::f64::consts::PI).sqrt())
             };
             let grown = match (guard, outline) {
                 (Some(guard), _) => {
@@ -251,9 +244,8 @@ pub(super) fn of_view(
                 }
                 (None, Some(outline)) => {
                     let [lo, hi] = range_f64;
-                    let extent = |lambda: f64| {
-                        footprint.extent_px(lambda, outline.0.along) * holds(lambda)
-                    };
+                    let extent =
+                        |lambda: f64| footprint.extent_px(lambda, outline.0.along) * holds(lambda);
                     let extents = [lo, 0.5 * (lo + hi), hi].map(extent);
                     let most = extents.into_iter().fold(DVec2::ZERO, DVec2::max);
                     Grown::around(outline, &corners_px, reach, most)
@@ -278,8 +270,8 @@ pub(super) fn of_view(
                     [0, 1, 2].map(|k| axes.map(|axis| axis[k] as f32))
                 },
                 screen: *screen,
-                per_sample: [footprint.base, footprint.per_lambda]
-                    .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / (radius * samples)))),
+                per_px: [footprint.base, footprint.per_lambda]
+                    .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / radius))),
                 gaze: gaze(&scene.objects[object], &own_grown),
                 representatives: scene.objects[object].representatives.start,
                 detail: detail as f32,
@@ -311,10 +303,10 @@ impl Grown {
     fn around(
         (outline, most): &(Outline, DVec2),
         corners_px: &[DVec3; 3],
-        reach: Reach,
+        reach: f64,
         splat_px: DVec2,
     ) -> Self {
-        let px = splat_px.min(DVec2::splat(reach.splat)).min(*most) + reach.samples + CELL_SLACK_PX;
+        let px = splat_px.min(DVec2::splat(reach)).min(*most) + f64::from(CELL_SLACK_PX);
         Self::Four(guard::weights_of(corners_px, outline.grown(px)))
     }
 
@@ -362,7 +354,8 @@ fn own_detail(detail: f64, corners: &[DVec3; 3], footprint: &Footprint, range: [
     let reach = [lo, 0.5 * (lo + hi), hi]
         .into_iter()
         .map(|lambda| {
-            let radius = EVENNESS * (footprint.area_per_px(lambda) / std::f64::consts::PI).sqrt();
+            let radius =
+                f64::from(EVENNESS) * (footprint.area_per_px(lambda) / std::f64::consts::PI).sqrt();
             radius * footprint.px_per_unit(lambda)
         })
         .fold(0.0, f64::max);
@@ -410,12 +403,12 @@ fn homogeneous(eye: &Eye, v: DVec3) -> DVec3 {
     )
 }
 
-fn screen_forms(eye: &Eye, patch: &Patch, corners: [DVec3; 3], samples: f64) -> [[f32; 3]; 3] {
+fn screen_forms(eye: &Eye, patch: &Patch, corners: [DVec3; 3]) -> [[f32; 3]; 3] {
     let [left, top] = patch.rect.min.map(f64::from);
     let h = corners.map(|v| homogeneous(eye, v));
     [
-        linear_form(h.map(|h| (h.x - left * h.z) * samples)),
-        linear_form(h.map(|h| (h.y - top * h.z) * samples)),
+        linear_form(h.map(|h| h.x - left * h.z)),
+        linear_form(h.map(|h| h.y - top * h.z)),
         linear_form(h.map(|h| h.z)),
     ]
 }

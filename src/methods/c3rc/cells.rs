@@ -6,7 +6,7 @@ mod field;
 mod fit;
 
 use fearless_simd::dispatch;
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::field::{Linear, RayField, centre};
@@ -15,14 +15,14 @@ use super::super::FrameInput;
 use super::cameras::{CameraSettings, Top, View, of_view, sees_objects, starts};
 use super::guard::Outline;
 use crate::camera::Eye;
-use crate::camera::three_ray::{RayScale, Rays};
-use crate::plan::{CameraInstance, Pixels};
+use crate::camera::three_ray::Rays;
+use crate::plan::{CELL_SLACK_PX, CameraInstance, Pixels};
 use crate::visibility::{MirrorTriangleIndex, OwnPixels, Patch, PixelRect};
 
 /// Columns and rows of a tile: the largest cell. A row is a word of bits.
-const TILE: usize = 32;
-/// How far a ray of a cell may lie from its camera's, in pixels (untuned).
-pub(super) const TOLERANCE_PX: f32 = 1.0;
+const TILE_PX: u32 = 32;
+/// The same for indices.
+const TILE: usize = TILE_PX as usize;
 /// How far points of the mirror may lie from a cell's plane, in pixels (untuned).
 const SURFACE_TOLERANCE_PX: f32 = 2.0;
 /// What a tile sees is bounded by a fit to its rays that is no farther off than this, in pixels.
@@ -58,7 +58,7 @@ pub(super) fn cells(
     settings: CameraSettings,
 ) -> (Vec<Patch>, Pixels, (Vec<CameraInstance>, Vec<u32>)) {
     let size = frame.eye.size;
-    let tile = TILE as u32;
+    let tile = TILE_PX;
     let across = size.width.div_ceil(tile);
     let count = across * size.height.div_ceil(tile);
     let top = Top::new(frame.scene, frame.eye);
@@ -135,11 +135,11 @@ fn sees_nothing(
     }
     let group = Group { rows: *shown, known: *shown, linear };
     let patch = group.patch(origin, field);
-    let mut view = group.view(eye, origin, &patch, settings.ray_scale);
+    let (mut view, _) = group.view(eye, origin, &patch);
     let slack = f64::from(slack * UNSEEN);
-    view.outline = view.outline.map(|(outline, most)| {
-        (Outline { half: outline.half + slack, ..outline }, most)
-    });
+    view.outline = view
+        .outline
+        .map(|(outline, most)| (Outline { half: outline.half + slack, ..outline }, most));
     !sees_objects(eye, top, &view, settings)
 }
 
@@ -167,14 +167,16 @@ fn of_tile(
         let about = field.at(seed);
         let tangent = field.tangent(frame.eye, frame.scene, seed);
         let center = [centre(seed[0]), centre(seed[1])];
-        let growing = GROWING * TOLERANCE_PX;
+        let growing = GROWING * CELL_SLACK_PX;
         let mut linear = tangent;
-        let mut near = Judge::new(&tangent, center, focal_px, growing, SURFACE_TOLERANCE_PX).accepted(&field.field, &left);
+        let mut near = Judge::new(&tangent, center, focal_px, growing, SURFACE_TOLERANCE_PX)
+            .accepted(&field.field, &left);
         for round in 0..ROUNDS {
             let sums = Sums::new(&field.field, about, &near);
             let Some(better) = sums.fit(about) else { break };
-            let tolerance = if round + 1 < ROUNDS { growing } else { TOLERANCE_PX };
-            let judge = Judge::new(&better, sums.middle(), focal_px, tolerance, SURFACE_TOLERANCE_PX);
+            let tolerance = if round + 1 < ROUNDS { growing } else { CELL_SLACK_PX };
+            let judge =
+                Judge::new(&better, sums.middle(), focal_px, tolerance, SURFACE_TOLERANCE_PX);
             let grown = judge.accepted(&field.field, &left);
             let same = grown == near;
             (linear, near) = (better, grown);
@@ -184,13 +186,15 @@ fn of_tile(
         }
         if near[seed[1]] >> seed[0] & 1 == 0 {
             linear = tangent;
-            near = Judge::new(&tangent, center, focal_px, TOLERANCE_PX, SURFACE_TOLERANCE_PX).accepted(&field.field, &left);
+            near = Judge::new(&tangent, center, focal_px, CELL_SLACK_PX, SURFACE_TOLERANCE_PX)
+                .accepted(&field.field, &left);
             near[seed[1]] |= 1 << seed[0];
         }
         for y in 0..TILE {
             left[y] &= !near[y];
         }
-        let judge = Judge::new(&linear, center, focal_px, NEIGHBOURS * TOLERANCE_PX, SURFACE_TOLERANCE_PX);
+        let judge =
+            Judge::new(&linear, center, focal_px, NEIGHBOURS * CELL_SLACK_PX, SURFACE_TOLERANCE_PX);
         let known = judge.accepted(&field.field, &shown);
         out.push(Group { rows: near, known, linear });
     }
@@ -234,27 +238,30 @@ impl Group {
         }
     }
 
-    fn view<'a>(
-        &self,
-        eye: &Eye,
-        origin: [u32; 2],
-        patch: &'a Patch,
-        scale: RayScale,
-    ) -> View<'a> {
+    /// The group's camera, and the inverse depth of where its rays start.
+    fn view<'a>(&self, eye: &Eye, origin: [u32; 2], patch: &'a Patch) -> (View<'a>, Plane) {
         let outline = outline(&self.rows, origin);
-        let plane = inverse_depth(&self.linear, origin, &outline);
+        let inverse = inverse_depth(&self.linear, origin, &outline);
         let [a, b, _, c] = outline.grown(DVec2::ZERO);
-        let rays = construction_rays(eye, origin, [a, b, c], &self.linear, plane, scale);
+        let rays = construction_rays(eye, origin, [a, b, c], &self.linear, &inverse);
         let most = farthest(&self.linear, outline.along);
-        View { patch, rays, front: [1.0; 3], outline: Some((outline, most)) }
+        (View { patch, rays, front: [1.0; 3], outline: Some((outline, most)) }, inverse)
     }
 
-    /// The direction of the exact ray of a pixel less that of the group's.
-    fn deviation(&self, field: &RayField, x: usize, y: usize) -> Vec3 {
+    /// The direction of the exact ray of a pixel, less that of the group's camera.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
+    fn deviation(
+        &self,
+        field: &RayField,
+        origin: [u32; 2],
+        [x, y]: [usize; 2],
+        inverse: &Plane,
+    ) -> [f32; 3] {
         let (cx, cy) = (centre(x), centre(y));
-        let depth = 1.0 / self.linear.get(3, cx, cy).max(f32::MIN_POSITIVE);
-        let of = |k: usize| field.field[k][y * TILE + x] - self.linear.get(k, cx, cy);
-        Vec3::new(of(0), of(1), of(2)) * depth
+        let px = middle(origin) + DVec2::new(f64::from(cx), f64::from(cy));
+        let depth = (1.0 / inverse.at(px)) as f32;
+        let exact = field.at([x, y]);
+        [0, 1, 2].map(|k| (exact[k] - self.linear.get(k, cx, cy)) * depth)
     }
 }
 
@@ -274,7 +281,7 @@ impl Cells {
             first_pixel: index(self.pixels.deviations.len()),
         });
         let cameras = self.cameras.len();
-        let view = group.view(frame.eye, origin, &patch, settings.ray_scale);
+        let (view, inverse) = group.view(frame.eye, origin, &patch);
         of_view(frame, top, &view, index(self.patches.len()), settings, &mut self.cameras);
         if self.cameras.len() == cameras {
             return;
@@ -288,7 +295,7 @@ impl Cells {
             let mut last_known = [0.0; 3];
             for x in from..to {
                 if (group.rows[y] | group.known[y]) >> x & 1 != 0 {
-                    last_known = group.deviation(field, x, y).to_array();
+                    last_known = group.deviation(field, origin, [x, y], &inverse);
                     if x > 0 && (group.rows[y] | group.known[y]) << (32 - x) == 0 {
                         self.pixels.deviations[begin..].fill(last_known);
                     }
@@ -301,10 +308,10 @@ impl Cells {
     fn append(&mut self, other: Self) {
         let (patches, rows) = (index(self.patches.len()), index(self.pixels.rows.len()));
         let pixels = index(self.pixels.deviations.len());
-        let cameras = other.cameras.into_iter().map(|camera| CameraInstance {
-            patch: camera.patch + patches,
-            ..camera
-        });
+        let cameras = other
+            .cameras
+            .into_iter()
+            .map(|camera| CameraInstance { patch: camera.patch + patches, ..camera });
         self.cameras.extend(cameras);
         self.patches.extend(other.patches.into_iter().map(|patch| Patch {
             own: patch.own.map(|own| OwnPixels {
@@ -325,20 +332,26 @@ const AROUND_PX: f64 = 24.0;
 
 /// A linear function of picture positions: its value at one and its slope there.
 struct Plane {
-    at: DVec2,
+    center: DVec2,
     value: f64,
     slope: DVec2,
 }
 
+impl Plane {
+    fn at(&self, px: DVec2) -> f64 {
+        self.value + self.slope.dot(px - self.center)
+    }
+}
+
 /// The inverse depth of a cell's rays, made so flat that it stays positive all around the cell.
 fn inverse_depth(linear: &Linear<4>, origin: [u32; 2], outline: &Outline) -> Plane {
-    let at = outline.center;
-    let p = at - middle(origin);
+    let center = outline.center;
+    let p = center - middle(origin);
     let slope = DVec2::new(f64::from(linear.right[3]), f64::from(linear.down[3]));
     let value = f64::from(linear.at[3]) + slope.dot(p);
     let around = AROUND_PX + outline.half.element_sum();
     let share = ((1.0 - LEAST_INVERSE) * value / (slope.length() * around)).min(1.0);
-    Plane { at, value, slope: slope * share }
+    Plane { center, value, slope: slope * share }
 }
 
 /// A rectangle along the main direction of the pixels' spread that holds them all.
@@ -357,7 +370,8 @@ fn outline(mask: &Mask, origin: [u32; 2]) -> Outline {
             yy += cy * cy;
         }
     }
-    let (xx, xy, yy) = (xx / n - x * x / (n * n), xy / n - x * y / (n * n), yy / n - y * y / (n * n));
+    let (xx, xy, yy) =
+        (xx / n - x * x / (n * n), xy / n - x * y / (n * n), yy / n - y * y / (n * n));
     // Nearly round ones lie along the rows.
     let apart = ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt();
     let along = if apart < 0.3 * (xx + yy) {
@@ -407,8 +421,7 @@ fn construction_rays(
     origin: [u32; 2],
     corners_px: [DVec2; 3],
     linear: &Linear<4>,
-    inverse: Plane,
-    scale: RayScale,
+    inverse: &Plane,
 ) -> Rays {
     let middle = middle(origin);
     let at = |k: usize, p: DVec2| {
@@ -419,15 +432,10 @@ fn construction_rays(
     let focal = f64::from(eye.focal_px);
     let (cx, cy) = (0.5 * f64::from(eye.size.width), 0.5 * f64::from(eye.size.height));
     let rays = corners_px.map(|px| {
-        let depth = 1.0 / (inverse.value + inverse.slope.dot(px - inverse.at));
+        let depth = 1.0 / inverse.at(px);
         let view = forward + right * ((px.x - cx) / focal) - up * ((px.y - cy) / focal);
         let p = px - middle;
-        let direction = DVec3::new(at(0, p), at(1, p), at(2, p));
-        let direction = match scale {
-            RayScale::EyeDistance => direction * depth,
-            RayScale::Unit => direction.normalize_or_zero(),
-        };
-        (position + view * depth, direction)
+        (position + view * depth, DVec3::new(at(0, p), at(1, p), at(2, p)) * depth)
     });
     Rays { origins: rays.map(|r| r.0), directions: rays.map(|r| r.1) }
 }

@@ -12,15 +12,6 @@ pub(super) const MAX_GUARD: f64 = 0.5;
 /// Added for the rounding of weights to f32.
 const SLACK: f64 = 1e-3;
 
-/// What has to be seen of a patch, in pixels.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
-    /// How far a pixel's samples lie from its centre.
-    pub(super) samples: f64,
-    /// How far a splat may lie from a sample that it covers.
-    pub(super) splat: f64,
-}
-
 /// Shares of the splat's reach at which margins are computed; between them a chord is taken.
 const STEPS: [f64; 7] = [0.0, 0.03, 0.0625, 0.125, 0.25, 0.5, 1.0];
 
@@ -28,7 +19,7 @@ const STEPS: [f64; 7] = [0.0, 0.03, 0.0625, 0.125, 0.25, 0.5, 1.0];
 pub(super) struct Guard {
     /// By [`STEPS`].
     margins: [DVec3; STEPS.len()],
-    reach: Reach,
+    reach: f64,
 }
 
 impl Guard {
@@ -37,14 +28,14 @@ impl Guard {
         corners: &[DVec3; 3],
         visibility: &Visibility,
         patch: &Patch,
-        reach: Reach,
+        reach: f64,
     ) -> Self {
         Self { margins: margins(corners, visibility, patch, reach), reach }
     }
 
     /// The margins for splats that lie at most so many pixels from a sample that they cover.
     pub(super) fn margins(&self, splat_px: f64) -> DVec3 {
-        let share = splat_px / self.reach.splat;
+        let share = splat_px / self.reach;
         // The least weight over points that move apart is a concave function of how far they do: the chord is on
         // the safe side. Nothing is found for what is not a number.
         match STEPS.iter().position(|step| share <= *step) {
@@ -112,7 +103,7 @@ fn margins(
     corners: &[DVec3; 3],
     visibility: &Visibility,
     patch: &Patch,
-    reach: Reach,
+    reach: f64,
 ) -> [DVec3; STEPS.len()] {
     let weights = Weights::new(corners);
     let mut least = [DVec3::INFINITY; STEPS.len()];
@@ -120,7 +111,7 @@ fn margins(
         let Some((first, last)) = run(visibility, patch, y) else { continue };
         for (least, step) in least.iter_mut().zip(STEPS) {
             // Half of the octagon about the disk of that radius, about the first pixel and, mirrored, the last.
-            let r = reach.samples + step * reach.splat;
+            let r = step * reach;
             let s = r * OCTAGON;
             for (dx, dy) in [(r, s), (r, -s), (s, r), (s, -r)] {
                 let y = f64::from(y) + 0.5 + dy;
@@ -137,9 +128,9 @@ fn margin(least: DVec3) -> DVec3 {
 }
 
 /// Margins that are never less than those of any [`Guard`] of the patch, at once: for what need not be exact.
-pub(super) fn around(corners: &[DVec3; 3], patch: &Patch, reach: Reach) -> DVec3 {
+pub(super) fn around(corners: &[DVec3; 3], patch: &Patch, reach: f64) -> DVec3 {
     let weights = Weights::new(corners);
-    let reach = reach.samples + reach.splat - 0.5;
+    let reach = reach - 0.5;
     let [left, top] = patch.rect.min.map(|v| f64::from(v) - reach);
     let [right, bottom] = patch.rect.max.map(|v| f64::from(v) + reach);
     let corners = [(left, top), (right, top), (left, bottom), (right, bottom)];
@@ -227,13 +218,12 @@ mod tests {
         let px = [DVec2::new(5.3, 4.1), DVec2::new(33.0, 9.7), DVec2::new(14.2, 24.6)];
         let (corners, visibility, patch) = setting(px);
         let weights = Weights::new(&corners);
-        for (samples, splat) in [(0.0, 0.5), (0.0, 1.0), (0.35, 0.5)] {
-            let reach = Reach { samples, splat };
+        for reach in [0.5, 1.0, 2.0] {
             let guard = Guard::new(&corners, &visibility, &patch, reach);
             let around = around(&corners, &patch, reach);
             for (step, margins) in STEPS.into_iter().zip(guard.margins) {
                 assert!(margins.cmple(around).all(), "{margins} is more than {around}");
-                let reach = samples + step * splat;
+                let reach = step * reach;
                 let mut tight = DVec3::NEG_INFINITY;
                 for (i, _) in visibility.mirror_ids.iter().enumerate().filter(|(_, id)| **id == 3) {
                     for turn in 0..16 {
@@ -254,7 +244,7 @@ mod tests {
     fn margins_grow_with_the_distance_of_surfels_and_end_at_the_splat() {
         let px = [DVec2::new(5.3, 4.1), DVec2::new(33.0, 9.7), DVec2::new(14.2, 24.6)];
         let (corners, visibility, patch) = setting(px);
-        let guard = Guard::new(&corners, &visibility, &patch, Reach { samples: 0.0, splat: 1.0 });
+        let guard = Guard::new(&corners, &visibility, &patch, 1.0);
         let origins = px.map(|p| (p * 0.01).extend(0.0));
         let rays = Rays { origins, directions: origins.map(|v| v + DVec3::Z) };
         let footprint = Footprint::new(&px, &rays);
@@ -267,6 +257,9 @@ mod tests {
         assert_eq!(at(1.0), guard.margins[STEPS.len() - 1]);
         assert_eq!(at(f64::INFINITY), guard.margins[STEPS.len() - 1]);
         let flat = Footprint::new(&[DVec2::ZERO; 3], &rays);
-        assert_eq!(guard.holding(|_| 0.001, &flat, [0.5, 1.0]), guard.margins[STEPS.len() - 1]);
+        assert_eq!(
+            guard.margins(splat_px(|_| 0.001, &flat, [0.5, 1.0])),
+            guard.margins[STEPS.len() - 1]
+        );
     }
 }

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::camera::three_ray::BoxTest;
 use crate::cull::Culler;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::plan::{DepthKey, Pass, Pixels, Plan, SplatPass, SplatShape};
 use crate::scene::prepared::milliseconds;
 use crate::visibility::{MirrorTriangleIndex, PatchScratch, patches};
@@ -45,18 +45,10 @@ static INFO: MethodInfo = MethodInfo {
         },
         ParamInfo {
             id: "splat",
-            about: "samples that a surfel covers: those that its disk is seen on, the one it falls on, or 2 x 2",
+            about: "pixels that a surfel covers: those that its disk is seen on, in part, the one it falls on, or 2 x 2",
             unit: "",
             kind: ParamKind::Choice(&["ellipse", "square1", "square2"]),
             default: Value::Choice("square2"),
-            is_quality_knob: true,
-        },
-        ParamInfo {
-            id: "samples",
-            about: "samples along a pixel's side, each with the nearest surfel of its own",
-            unit: "",
-            kind: ParamKind::Integer(1, 4),
-            default: Value::Integer(1),
             is_quality_knob: true,
         },
         ParamInfo {
@@ -85,18 +77,26 @@ static INFO: MethodInfo = MethodInfo {
             is_quality_knob: false,
         },
     ],
-    presets: &[Preset {
-        id: "paper",
-        about: "as Mei et al.: unit rays, their box test, leaves of 122, 1-pixel squares, first root, push-back depth",
-        params: &[
-            ("test", "paper"),
-            ("splat", "square1"),
-            ("depth", "push-back"),
-            ("ray-scale", "unit"),
-            ("roots", "first"),
-        ],
-        leaf_points: Some(122),
-    }],
+    presets: &[
+        Preset {
+            id: "paper",
+            about: "as Mei et al.: unit rays, their box test, leaves of 122, 1-pixel squares, first root, push-back depth",
+            params: &[
+                ("test", "paper"),
+                ("splat", "square1"),
+                ("depth", "push-back"),
+                ("ray-scale", "unit"),
+                ("roots", "first"),
+            ],
+            leaf_points: Some(122),
+        },
+        Preset {
+            id: "smooth",
+            about: "exact rays, ellipses that cover pixels in part, representatives: smooth edges, no moiré",
+            params: &[("cameras", "cells"), ("splat", "ellipse"), ("detail", "2")],
+            leaf_points: None,
+        },
+    ],
 };
 
 impl Method for C3rc {
@@ -118,14 +118,21 @@ impl Method for C3rc {
             "square2" => SplatShape::Square2,
             _ => SplatShape::Ellipse,
         };
-        let samples = params.integer("samples");
         let detail = params.integer("detail");
         let settings = cameras::CameraSettings {
             ray_scale: ray_scale(params.choice("ray-scale")),
             shape,
-            samples,
             detail: f64::from(detail),
         };
+        if params.choice("cameras") == "cells" {
+            for (id, value) in [("test", "paper"), ("ray-scale", "unit")] {
+                if params.choice(id) == value {
+                    let what = format!("--{id} {value}");
+                    let remedy = format!("use --cameras triangles, or another --{id}");
+                    return Err(Error::input(what, "", "goes with triangles only", remedy));
+                }
+            }
+        }
         let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
         let (patches, pixels, cameras) = if params.choice("cameras") == "cells" {
             cells::cells(frame, settings)
@@ -151,7 +158,6 @@ impl Method for C3rc {
             patch_cameras,
             batches: Box::new(Culler::new(scene, test)),
             shape,
-            samples,
             depth: match params.choice("depth") {
                 "push-back" => DepthKey::PushBack,
                 _ => DepthKey::Lambda,

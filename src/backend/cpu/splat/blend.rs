@@ -3,8 +3,8 @@
 
 use glam::{Vec3, Vec4};
 
-use super::hits::Hits;
 use super::EMPTY;
+use super::hits::Hits;
 
 /// How much of a pixel splats cover for each part that their areas say: they are not spread so evenly that the areas
 /// add up everywhere (untuned).
@@ -89,7 +89,7 @@ fn each(
     let e = &hits.ellipse;
     let (x, y, a, b, c) = (e[0][i], e[1][i], e[2][i], e[3][i], e[4][i]);
     let high = e[6][i];
-    // Centres of samples lie half a sample behind their index. Not negative: casts truncate, which is floor.
+    // Centres of pixels lie half a pixel behind their index. Not negative: casts truncate, which is floor.
     let first = (y - high - 0.5).ceil().max(0.0);
     let last = (y + high - 0.5).min(spans.len() as f32 - 1.0);
     let inverse = 1.0 / a;
@@ -107,10 +107,104 @@ fn each(
         while column <= end {
             let dx = column + 0.5 - x;
             let inside = (1.0 - (dx * (a * dx + slope) + rest)).max(0.0);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "see above")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "see above"
+            )]
             touch(row as usize * stride + column as usize, inside * inside);
             column += 1.0;
         }
         row += 1.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::FOREIGN;
+    use super::*;
+
+    /// A round splat: its middle, radius, weight in the middle and depth; its surfel is its number.
+    fn hits(list: &[[f32; 5]]) -> Hits {
+        let mut hits = Hits::default();
+        hits.reserve(list.len());
+        for (i, &[x, y, radius, weight, depth]) in list.iter().enumerate() {
+            let form = 1.0 / (radius * radius);
+            let values = [x, y, form, 0.0, form, radius, radius, weight];
+            for (list, value) in hits.ellipse.iter_mut().zip(values) {
+                list[i] = value;
+            }
+            hits.depth[i] = depth;
+            hits.surfel[i] = u32::try_from(i).unwrap();
+            hits.len += 1;
+        }
+        hits
+    }
+
+    /// Five columns and rows, of which the middle three are the patch's.
+    fn tile() -> Vec<u64> {
+        let own = |i: usize| (1..4).contains(&(i % 5)) && (1..4).contains(&(i / 5));
+        (0..25).map(|i| if own(i) { EMPTY } else { FOREIGN }).collect()
+    }
+
+    const MIDDLE: usize = 12;
+
+    #[test]
+    fn the_nearest_fill_a_pixel_and_the_rest_shows_through() {
+        let radiance = [Vec3::X, Vec3::Y, Vec3::Z];
+        let mut layers = Layers::default();
+        let draw = |layers: &mut Layers, list: &[[f32; 5]]| {
+            let mut tile = tile();
+            layers.draw(&hits(list), &radiance, 5, &mut tile);
+            tile[MIDDLE]
+        };
+        // A quarter in front, whatever the order; behind it half of one; a third behind both fills the rest.
+        let parts = [
+            [2.5, 2.5, 0.4, 9.0, 3.0],
+            [2.5, 2.5, 0.4, 0.25 / GAIN, 1.0],
+            [2.5, 2.5, 0.4, 0.5 / GAIN, 2.0],
+        ];
+        let key = draw(&mut layers, &parts);
+        assert!(layers.at(MIDDLE, 5).abs_diff_eq(Vec4::new(0.25, 0.25, 0.5, 1.0), 1e-6));
+        assert_eq!((key & 0xffff_ffff, (key >> 32) as u32), (1, 1f32.to_bits()), "the nearest");
+        // Alone the front leaves the rest to the environment.
+        draw(&mut layers, &parts[1..2]);
+        assert!(layers.at(MIDDLE, 5).abs_diff_eq(Vec4::new(0.25, 0.0, 0.0, 0.25), 1e-6));
+        // A full front hides all.
+        draw(&mut layers, &[[2.5, 2.5, 0.4, 2.0, 1.0], [2.5, 2.5, 0.4, 2.0, 2.0]]);
+        assert!(layers.at(MIDDLE, 5).abs_diff_eq(Vec4::new(1.0, 0.0, 0.0, 1.0), 1e-6));
+    }
+
+    #[test]
+    fn a_splat_covers_what_its_form_says_within_the_patch() {
+        let (x, y, radius) = (2.2f32, 2.7f32, 1.9f32);
+        let mut layers = Layers::default();
+        let mut tile = tile();
+        layers.draw(&hits(&[[x, y, radius, 0.1, 1.0]]), &[Vec3::ONE], 5, &mut tile);
+        for row in 0..5 {
+            for column in 0..5 {
+                let slot = row * 5 + column;
+                let (dx, dy) = (column as f32 + 0.5 - x, row as f32 + 0.5 - y);
+                let kernel = (1.0 - (dx * dx + dy * dy) / (radius * radius)).max(0.0).powi(2);
+                let own = (1..4).contains(&row) && (1..4).contains(&column);
+                let expected = if own { 0.1 * GAIN * kernel } else { 1.0 };
+                assert!((layers.sum[slot].w - expected).abs() < 1e-6, "{row} {column}");
+            }
+        }
+    }
+
+    #[test]
+    fn gaps_between_covered_pixels_are_closed_and_edges_stay() {
+        let mut layers = Layers { sum: vec![Vec4::W; 25], ..Layers::default() };
+        layers.sum[MIDDLE] = Vec4::new(0.3, 0.15, 0.0, 0.6);
+        assert!(layers.at(MIDDLE, 5).abs_diff_eq(Vec4::new(0.5, 0.25, 0.0, 1.0), 1e-6));
+        // The right and lower neighbours are open: an edge.
+        layers.sum[MIDDLE + 1] = Vec4::ZERO;
+        layers.sum[MIDDLE + 5] = Vec4::ZERO;
+        assert_eq!(layers.at(MIDDLE, 5).w, 0.6);
+        // What is nearly open stays so.
+        layers.sum = vec![Vec4::W; 25];
+        layers.sum[MIDDLE] = Vec4::splat(0.1);
+        assert_eq!(layers.at(MIDDLE, 5).w, 0.1);
     }
 }

@@ -43,7 +43,7 @@ impl Hits {
         self.len = to.end;
     }
 
-    /// Draws squares into a tile with rows of `stride` samples.
+    /// Draws squares into a tile with rows of `stride` pixels.
     pub(super) fn draw_squares(&self, shape: SplatShape, stride: usize, tile: &mut [u64]) {
         let n = self.len;
         let hits = self.cell[..n].iter().zip(&self.depth[..n]).zip(&self.surfel[..n]);

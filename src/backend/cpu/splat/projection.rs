@@ -9,7 +9,9 @@ use crate::camera::three_ray::project::along;
 use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
 use crate::geometry::lanes::{Real, Vector, dot, dot_const};
-use crate::plan::{CameraInstance, DepthKey, LARGEST_ELLIPSE, SplatPass, SplatShape};
+use crate::plan::{
+    CELL_SLACK_PX, CameraInstance, DepthKey, EVENNESS, LARGEST_ELLIPSE, SplatPass, SplatShape,
+};
 use crate::visibility::Patch;
 
 /// A splat's kernel in the picture: 1 - (a x² + 2 b x y + c y²), squared.
@@ -23,7 +25,7 @@ struct Kernel<R> {
 
 /// The kernel of a disk is so many times as wide as the disk that holds a surfel (untuned).
 const SPREAD: f32 = 1.3;
-/// Radius of the kernel of a point, in samples: what a pixel sees of it (untuned).
+/// Radius of the kernel of a point, in pixels: what a pixel sees of it (untuned).
 const PIXEL: f32 = 0.7;
 
 impl<R: Real<Scalar = f32>> Kernel<R> {
@@ -47,8 +49,8 @@ impl<R: Real<Scalar = f32>> Kernel<R> {
     }
 }
 
-/// How the point of the ray that is seen moves, across the ray, with the place on the screen: a sample to the right and
-/// a sample down. In the camera's unit, see [`CameraInstance::per_sample`].
+/// How the point of the ray that is seen moves, across the ray, with the place on the screen: a pixel to the right and
+/// a pixel down. In the camera's unit, see [`CameraInstance::per_px`].
 #[derive(Clone, Copy)]
 struct Frame<R> {
     right: [R; 3],
@@ -56,7 +58,7 @@ struct Frame<R> {
 }
 
 impl<R: Real<Scalar = f32>> Frame<R> {
-    /// a, b, c: the squared distance a x² + 2 b x y + c y² from the surfel of the ray through a place (x, y) samples
+    /// a, b, c: the squared distance a x² + 2 b x y + c y² from the surfel of the ray through a place (x, y) pixels
     /// away, in the surfel's radius.
     #[inline(always)]
     fn form(&self, size: R) -> [R; 3] {
@@ -69,11 +71,9 @@ impl<R: Real<Scalar = f32>> Frame<R> {
 }
 
 /// A surfel's own disk has this share of the area of the one that holds a surfel.
-const PER_DISK: f32 = 1.0 / (1.5 * 1.5);
+const PER_DISK: f32 = 1.0 / (EVENNESS * EVENNESS);
 /// Surfels are not taken for thinner than this share of their width (untuned).
 const LEAST_FACING: f32 = 0.2;
-/// A cell's camera is at most about so many pixels beside the exact rays.
-const CELL_SLACK_PX: f32 = 1.0;
 /// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
 const MOST_CORRECTION_PX: f32 = 2.0;
 /// Of any vector.
@@ -116,10 +116,11 @@ impl Projection<'_> {
             let first = own.first_pixel as usize;
             &self.pass.pixels.deviations[first..first + count]
         });
-        let beyond = beyond + if deviations.is_some() { CELL_SLACK_PX * self.pass.samples as f32 } else { 0.0 };
+        let slack = if deviations.is_some() { CELL_SLACK_PX } else { 0.0 };
+        let beyond = beyond + slack;
         let before = V::broadcast(simd, -beyond);
         let width = V::broadcast(simd, (self.stride - BORDER) as f32 + beyond);
-        let rows = self.patch.rect.height() * self.pass.samples;
+        let rows = self.patch.rect.height();
         let height = V::broadcast(simd, (rows + BORDER) as f32 + beyond);
         let mut len = hits.len;
         let mut i = 0;
@@ -200,7 +201,7 @@ impl Projection<'_> {
     /// How rays run about the image's. `d`: the image's ray.
     #[inline(always)]
     fn frame<R: Real<Scalar = f32>>(&self, image: &Image<R>, d: [R; 3]) -> Frame<R> {
-        let [base, per_lambda] = self.camera.per_sample;
+        let [base, per_lambda] = self.camera.per_px;
         let right = along(base[0], per_lambda[0], image.lambda);
         let down = along(base[1], per_lambda[1], image.lambda);
         let per_length = image.lambda.splat(1.0) / dot(d, d);
@@ -223,27 +224,26 @@ impl Projection<'_> {
         lands: V::Mask,
     ) -> [V; 3] {
         let zero = V::broadcast(simd, 0.0);
-        let to_px = 1.0 / self.pass.samples as f32;
         let (width, height) = (self.patch.rect.width() as f32, self.patch.rect.height() as f32);
-        let column = ((x - offset) * to_px).floor().max(zero).min(zero.splat(width - 1.0));
-        let row = ((y - offset) * to_px).floor().max(zero).min(zero.splat(height - 1.0));
+        let column = (x - offset).floor().max(zero).min(zero.splat(width - 1.0));
+        let row = (y - offset).floor().max(zero).min(zero.splat(height - 1.0));
         let mut at = [0.0f32; MOST_LANES];
         V::select(lands, row * width + column, zero).store(&mut at);
         let mut e = [[0.0f32; MOST_LANES]; 3];
         for i in 0..V::LANES as usize {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and clamped")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "whole and clamped"
+            )]
             let deviation = deviations[at[i] as usize];
             (e[0][i], e[1][i], e[2][i]) = (deviation[0], deviation[1], deviation[2]);
         }
         let scale = image.lambda * (1.0 / self.camera.radius);
-        [
-            V::load(simd, &e[0]) * scale,
-            V::load(simd, &e[1]) * scale,
-            V::load(simd, &e[2]) * scale,
-        ]
+        [V::load(simd, &e[0]) * scale, V::load(simd, &e[1]) * scale, V::load(simd, &e[2]) * scale]
     }
 
-    /// From the camera's image to that of rays which run `apart` beside, in samples.
+    /// From the camera's image to that of rays which run `apart` beside, in pixels.
     #[inline(always)]
     fn correction<S: Simd, V: Vector<S>>(
         &self,
@@ -257,7 +257,7 @@ impl Projection<'_> {
         let det = a * c - b * b;
         let usable = zero.lt(det);
         let share = V::select(usable, V::broadcast(simd, -1.0) / det, zero);
-        let limit = V::broadcast(simd, MOST_CORRECTION_PX * self.pass.samples as f32);
+        let limit = V::broadcast(simd, MOST_CORRECTION_PX);
         let (dx, dy) = ((u * c - v * b) * share, (v * a - u * b) * share);
         [dx.max(-limit).min(limit), dy.max(-limit).min(limit)]
     }
@@ -295,11 +295,12 @@ impl Projection<'_> {
         let inverse = R::select(front, -inverse, inverse);
         let (right_n, down_n) =
             (dot(normal, frame.right) * inverse, dot(normal, frame.down) * inverse);
-        let mut on = *frame;
-        for k in 0..3 {
-            on.right[k] = frame.right[k] - right_n * d[k];
-            on.down[k] = frame.down[k] - down_n * d[k];
-        }
+        let [dx, dy, dz] = d;
+        let ([rx, ry, rz], [bx, by, bz]) = (frame.right, frame.down);
+        let on = Frame {
+            right: [rx - right_n * dx, ry - right_n * dy, rz - right_n * dz],
+            down: [bx - down_n * dx, by - down_n * dy, bz - down_n * dz],
+        };
         (on, facing, thin)
     }
 

@@ -1,8 +1,10 @@
 //! The exact rays of one tile: for every pixel the view ray, reflected at the interpolated normal.
 
+#![expect(clippy::needless_range_loop, reason = "compilers see through indices best")]
+
 use glam::{DVec3, Vec3};
 
-use super::TILE;
+use super::{TILE, TILE_PX};
 use crate::camera::Eye;
 use crate::scene::prepared::PreparedScene;
 use crate::visibility::{NONE_ID, Visibility};
@@ -81,8 +83,8 @@ impl RayField {
     ) -> [u32; TILE] {
         let mut shown = [0u32; TILE];
         let size = eye.size;
-        let columns = (size.width - left).min(TILE as u32) as usize;
-        let rows = (size.height - top).min(TILE as u32) as usize;
+        let columns = (size.width - left).min(TILE_PX) as usize;
+        let rows = (size.height - top).min(TILE_PX) as usize;
         self.ids.fill(NONE_ID);
         for (y, shown) in shown.iter_mut().enumerate().take(rows) {
             let from = (top as usize + y) * size.width as usize + left as usize;
@@ -164,7 +166,8 @@ impl RayField {
         let middle = self.middle;
         let slot = id as usize % FACETS;
         if self.facets[slot].id != id {
-            self.facets[slot] = Facet { id, normal_and_inverse: of_triangle(eye, scene, id, middle) };
+            self.facets[slot] =
+                Facet { id, normal_and_inverse: of_triangle(eye, scene, id, middle) };
         }
         self.facets[slot]
     }
@@ -192,7 +195,8 @@ fn of_triangle(eye: &Eye, scene: &PreparedScene, id: u32, middle: [f32; 2]) -> L
     let volume = a.dot(b.cross(c));
     let planes = [b.cross(c), c.cross(a), a.cross(b)].map(|n| n / volume);
     let view = eye.ray_through_px(middle.into()).as_dvec3();
-    let (right, down) = ((eye.right / eye.focal_px).as_dvec3(), (-eye.up / eye.focal_px).as_dvec3());
+    let (right, down) =
+        ((eye.right / eye.focal_px).as_dvec3(), (-eye.up / eye.focal_px).as_dvec3());
     let weighted = |direction: DVec3| {
         let w = planes.map(|plane| plane.dot(direction));
         let mut normal = DVec3::ZERO;

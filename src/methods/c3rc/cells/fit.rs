@@ -1,5 +1,7 @@
 //! Linear functions of the picture that describe the rays of some of a tile's pixels.
 
+#![expect(clippy::needless_range_loop, reason = "compilers see through indices best")]
+
 use glam::Vec3;
 
 use super::TILE;
@@ -144,7 +146,6 @@ pub(super) struct Judge {
 
 /// The cosine of the largest angle between rays of a cell, twice.
 const AHEAD: f32 = 0.75;
-
 
 /// Where rays change much less across one direction of the picture than across the other, a difference in that
 /// direction counts no more than this share says.
