@@ -140,8 +140,9 @@ impl Projection<'_> {
             let mut taken = !active;
             for image in project(&self.camera.camera, q, lo, hi).as_slice() {
                 let front = zero.lt(image.linear(self.camera.front)) & active;
-                let inside = image.within([EDGE_TOLERANCE; 3]) & front;
-                seen |= V::bits(inside);
+                if deviations.is_none() {
+                    seen |= V::bits(image.within([EDGE_TOLERANCE; 3]) & front);
+                }
                 let mut drawn = image.within(self.camera.guard) & front;
                 if self.pass.first_root_only {
                     drawn = drawn & !taken;
@@ -155,6 +156,15 @@ impl Projection<'_> {
                     drawn & zero.lt(w) & before.le(x) & x.lt(width) & before.le(y) & y.lt(height);
                 if !V::any(lands) {
                     continue;
+                }
+                if deviations.is_some() {
+                    // A cell's triangle is only half of its rectangle.
+                    let (right, bottom) = (self.patch.rect.width(), self.patch.rect.height());
+                    let inside = zero.le(x - offset)
+                        & zero.le(y - offset)
+                        & x.lt(zero.splat(right as f32 + offset))
+                        & y.lt(zero.splat(bottom as f32 + offset));
+                    seen |= V::bits(lands & inside);
                 }
                 let d = self.direction(image);
                 let depth = self.depth(image, d);
