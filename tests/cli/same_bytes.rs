@@ -51,6 +51,8 @@ fn with_level_of_detail() {
 #[test]
 fn with_cells() {
     same("c3rc --preset smooth");
+    same("c3rc --cameras cells --splat square1");
+    same("c3rc --cameras cells");
 }
 
 #[test]

@@ -193,6 +193,16 @@ impl Projection<'_> {
                         value.compress(lands, &mut list[len..]);
                     }
                 } else {
+                    // A square must lie in the tile, also after the correction.
+                    let (right, bottom) = (self.stride - BORDER, rows + BORDER);
+                    lands = lands
+                        & zero.le(x)
+                        & x.lt(zero.splat(right as f32))
+                        & zero.le(y)
+                        & y.lt(zero.splat(bottom as f32));
+                    if !V::any(lands) {
+                        continue;
+                    }
                     let cell = [x.floor(), y.floor()];
                     let fills = self.fills(frame.form(size), [cell[0] - x, cell[1] - y]);
                     V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
