@@ -25,7 +25,7 @@ impl<'a> Culler<'a> {
 
 impl BatchSource for Culler<'_> {
     fn cull(&self, camera: &CameraInstance, out: &mut Vec<Batch>) {
-        let object = &self.scene.objects[camera.object as usize];
+        let object = &self.scene.clouds[camera.object as usize];
         let walk = Walk {
             wide: object.tree.wide(),
             test: self.test,

@@ -8,7 +8,7 @@ use crate::visibility::Patch;
 pub struct CameraInstance {
     /// Index into [`SplatPass::patches`].
     pub patch: u32,
-    /// Index of the object.
+    /// Index of the object; those of mirrors that hide objects follow.
     pub object: u32,
     /// The projection's constants.
     pub camera: ThreeRay<f32>,
@@ -159,6 +159,8 @@ pub struct SplatPass<'a> {
     pub depth: DepthKey,
     /// Keep only the first root that has an image, as the paper's vertex program.
     pub first_root_only: bool,
+    /// Surfels from this one on show nothing: they hide what lies behind them from the mirrors.
+    pub first_hider: u32,
 }
 
 /// Computes the reflection pixel by pixel.

@@ -62,9 +62,10 @@ fn compare(scene: &PreparedScene, ours: &Planes, reference: &Planes) -> Truth {
     let reach: Vec<f32> = scene
         .objects
         .iter()
-        .map(|o| {
+        .zip(&scene.clouds)
+        .map(|(o, cloud)| {
             let area = o.mesh.area() * o.to_scene.scale.powi(2);
-            2.0 * narrow((area / o.surfels.len() as f64).sqrt())
+            2.0 * narrow((area / cloud.surfels.len() as f64).sqrt())
         })
         .collect();
     let (mut inner, mut covered, mut placed, mut extra, mut mirror) = (0, 0, 0, 0, 0);

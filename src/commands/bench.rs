@@ -59,8 +59,9 @@ pub(crate) fn layer(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> any
     }
     let rays = catoptric::methods::method("raytrace").expect("it is in the registry");
     let mut rays_params = Params::defaults(rays.info().params);
-    // The layer has no mirror occluders yet, so the rays need not look for them either.
-    rays_params.set(rays.info().param("mirror-occlusion"), "off")?;
+    // Both look for what mirrors hide, or neither.
+    let info = rays.info().param("mirror-occlusion");
+    rays_params.set(info, params.choice(info.id))?;
     let ready = args.scene.ready(leaf, cx)?;
     let mut a = Side::new(&ready, method, params, cx)?;
     let mut b = Side::new(&ready, rays, rays_params, cx)?;

@@ -31,11 +31,11 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
         mirrors.push(json!({ "name": mirror.name, "triangles": triangles }));
     }
     let mut objects = Vec::new();
-    for object in &scene.objects {
+    for (object, cloud) in scene.objects.iter().zip(&scene.clouds) {
         let triangles = object.mesh.triangles().len();
-        let surfels = object.surfels.len();
-        let tree = object.tree.statistics();
-        let b = object.bounds;
+        let surfels = cloud.surfels.len();
+        let tree = cloud.tree.statistics();
+        let b = cloud.bounds;
         let (min, max) = (b.min.as_dvec3() + scene.origin, b.max.as_dvec3() + scene.origin);
         say!(
             "  object {}: {triangles} triangles, {surfels} surfels; tree: {} leaves of {:.1}, mean depth {:.1}",

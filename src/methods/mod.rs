@@ -41,6 +41,15 @@ const RAY_SCALE: ParamInfo = ParamInfo {
     is_quality_knob: false,
 };
 
+const MIRROR_OCCLUSION: ParamInfo = ParamInfo {
+    id: "mirror-occlusion",
+    about: "whether mirrors hide what lies behind them from reflected rays, which then see the environment",
+    unit: "",
+    kind: ParamKind::Choice(&["on", "off"]),
+    default: Value::Choice("on"),
+    is_quality_knob: false,
+};
+
 /// What a word of [`RAY_SCALE`] means.
 fn ray_scale(word: &str) -> RayScale {
     if word == "unit" { RayScale::Unit } else { RayScale::EyeDistance }

@@ -69,7 +69,10 @@ impl PreparedScene {
             light: Light { to_sun: Vec3::Y, sun: Vec3::ZERO, ambient: Vec3::ONE },
         };
         let limits = KdTreeLimits::default();
-        let prepared = Self::of_sampled(&scene, vec![surfels], limits, &Context::default())?;
+        let cx = Context::default();
+        let mut sampled = vec![surfels];
+        sampled.extend(super::prepared::sample_mirrors(&scene, MAX_SURFELS, 1, &cx)?);
+        let prepared = Self::of_sampled(&scene, sampled, limits, &cx)?;
         let any_size = ImageSize { width: 1, height: 1 };
         if prepared.eye_for(any_size).is_none_or(|eye: Eye| !eye.position.is_finite()) {
             let remedy =

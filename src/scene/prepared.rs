@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
-use super::description::{Environment, EyeDescription, Light, Paint, Scene};
+use super::description::{Environment, EyeDescription, Light, Mirror, Paint, Scene};
 use super::{sample, shade};
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
 use crate::camera::eye::ImageSize;
@@ -67,7 +67,7 @@ pub struct PreparedMirror {
     pub first_triangle: u32,
 }
 
-/// A diffuse object: its surfels and tree live in its own space and never move.
+/// A diffuse object.
 #[derive(Clone, Debug)]
 pub struct PreparedObject {
     /// As in the scene.
@@ -80,20 +80,66 @@ pub struct PreparedObject {
     pub to_scene: Similarity,
     /// Vertices in scene space.
     pub positions: Vec<Vec3>,
+    /// Index of its first triangle over all objects.
+    pub first_triangle: u32,
+}
+
+/// The surfels of one object or mirror: they and their tree live in its own space and never move.
+#[derive(Clone, Debug)]
+pub struct Cloud {
+    /// Its own space to scene space.
+    pub to_scene: Similarity,
     /// Over its surfels; ranges are relative to `surfels.start`.
     pub tree: KdTree,
     /// Its part of the scene's surfels.
     pub surfels: Range<u32>,
     /// What stands for the nodes of its tree, behind its surfels.
     pub representatives: Range<u32>,
-    /// Its surface encloses it with outward normals: from outside, what faces away is hidden.
+    /// The surface encloses something with outward normals: from outside, what faces away is hidden.
     pub closed: bool,
-    /// Largest radius that one of its surfels stands for, object space; infinite if that is not known.
+    /// Largest radius that one of its surfels stands for, own space; infinite if that is not known.
     pub extent: f32,
     /// Contains its surfels, scene space.
     pub bounds: Aabb,
-    /// Index of its first triangle over all objects.
-    pub first_triangle: u32,
+}
+
+impl Cloud {
+    /// Appends `own` to `all`, in leaf order and followed by its representatives.
+    fn new(mut own: Surfels, closed: bool, limits: KdTreeLimits, all: &mut Surfels) -> Self {
+        let mut tree = KdTree::build(&mut own, limits);
+        let first = index(all.len());
+        let count = index(own.len());
+        let known = |e: f32| if e > 0.0 { e } else { f32::INFINITY };
+        let extent = own.extent.iter().copied().map(known).fold(0.0, f32::max);
+        tree.append_representatives(&mut own);
+        append(all, own);
+        Self {
+            to_scene: Similarity::IDENTITY,
+            tree,
+            surfels: first..first + count,
+            representatives: first + count..index(all.len()),
+            closed,
+            extent,
+            bounds: Aabb::EMPTY,
+        }
+    }
+
+    fn place(&mut self, to_scene: Similarity) {
+        let local = self.tree.bounds();
+        let corner = |i: u32| {
+            let pick = |bit: u32, lo: f32, hi: f32| if i >> bit & 1 == 0 { lo } else { hi };
+            DVec3::new(
+                pick(0, local.min.x, local.max.x).into(),
+                pick(1, local.min.y, local.max.y).into(),
+                pick(2, local.min.z, local.max.z).into(),
+            )
+        };
+        let bounds = Aabb::of((0..8).map(|i| to_scene.point(corner(i)).as_vec3()));
+        // The corners were rounded.
+        let slack = (bounds.min.abs().max(bounds.max.abs())) * (2.0 * f32::EPSILON);
+        self.bounds = Aabb { min: bounds.min - slack, max: bounds.max + slack };
+        self.to_scene = to_scene;
+    }
 }
 
 impl PreparedObject {
@@ -125,7 +171,10 @@ pub struct PreparedScene {
     pub mirrors: Vec<PreparedMirror>,
     /// Objects.
     pub objects: Vec<PreparedObject>,
-    /// All surfels, object by object, each in leaf order and followed by its representatives.
+    /// The surfels of each object, then of each mirror: what is behind a mirror is hidden.
+    pub clouds: Vec<Cloud>,
+    /// All surfels, cloud by cloud, each in leaf order and followed by its representatives. Those of mirrors have no
+    /// radiance.
     pub surfels: Surfels,
     /// The objects' triangles in scene space, object by object.
     pub triangles: TriangleBvh,
@@ -163,7 +212,8 @@ impl PreparedScene {
             return Err(Error::input("--leaf-size", "", problem, "choose a share such as 0.01"));
         }
         let start = Instant::now();
-        let sampled = sample_objects(scene, options, cx)?;
+        let mut sampled = sample_objects(scene, options, cx)?;
+        sampled.extend(sample_mirrors(scene, options.surfels, options.seed, cx)?);
         let sample_ms = milliseconds(start);
         let mut prepared = Self::of_sampled(scene, sampled, options.tree, cx)?;
         prepared.times.sample_ms = sample_ms;
@@ -173,8 +223,8 @@ impl PreparedScene {
         Ok(prepared)
     }
 
-    /// Sorts the objects' surfels into trees and puts everything in its place, unshaded. `sampled` holds each
-    /// object's surfels, none of them empty.
+    /// Sorts surfels into trees and puts everything in its place, unshaded. `sampled` holds each object's surfels, then
+    /// each mirror's, none of them empty.
     ///
     /// # Errors
     /// Cancelled.
@@ -189,30 +239,24 @@ impl PreparedScene {
         let mut objects = Vec::with_capacity(sampled.len());
         let origin = mirror_center(scene);
         let mut first_triangle = 0;
-        for (object, mut own) in scene.objects.iter().zip(sampled) {
-            cx.step("building trees", objects.len() as f64 / scene.objects.len() as f64)?;
-            let mut tree = KdTree::build(&mut own, limits);
-            let first = index(surfels.len());
-            let count = index(own.len());
-            let known = |e: f32| if e > 0.0 { e } else { f32::INFINITY };
-            let extent = own.extent.iter().copied().map(known).fold(0.0, f32::max);
-            tree.append_representatives(&mut own);
-            append(&mut surfels, own);
+        for object in &scene.objects {
             objects.push(PreparedObject {
                 name: object.name.clone(),
                 mesh: Arc::clone(&object.mesh),
                 paint: object.paint,
                 to_scene: Similarity::IDENTITY,
                 positions: Vec::new(),
-                tree,
-                surfels: first..first + count,
-                representatives: first + count..index(surfels.len()),
-                closed: object.mesh.is_closed_outward(),
-                extent,
-                bounds: Aabb::EMPTY,
                 first_triangle,
             });
             first_triangle += index(object.mesh.triangles().len());
+        }
+        let meshes = scene.objects.iter().map(|o| &o.mesh);
+        let meshes = meshes.chain(scene.mirrors.iter().map(|m| &m.mesh));
+        let count = sampled.len();
+        let mut clouds: Vec<Cloud> = Vec::with_capacity(count);
+        for (mesh, own) in meshes.zip(sampled) {
+            cx.step("building trees", clouds.len() as f64 / count as f64)?;
+            clouds.push(Cloud::new(own, mesh.is_closed_outward(), limits, &mut surfels));
         }
         pad(&mut surfels);
         let times = PrepareTimes { tree_ms: milliseconds(start), ..PrepareTimes::default() };
@@ -222,8 +266,9 @@ impl PreparedScene {
             origin,
             eye: scene.eye,
             mirrors: prepare_mirrors(scene, origin),
-            tree_builds: objects.len(),
+            tree_builds: clouds.len(),
             objects,
+            clouds,
             surfels,
             triangles: TriangleBvh::build(&[]),
             mirror_triangles: TriangleBvh::build(&[]),
@@ -240,6 +285,9 @@ impl PreparedScene {
         for (i, object) in scene.objects.iter().enumerate() {
             prepared.place(i, &object.transform);
         }
+        for (cloud, mirror) in prepared.clouds[scene.objects.len()..].iter_mut().zip(&scene.mirrors) {
+            cloud.place(from_origin(&mirror.transform, origin));
+        }
         prepared.average();
         Ok(prepared)
     }
@@ -254,24 +302,11 @@ impl PreparedScene {
     /// Moves an object (object space to world). Its surfels and tree stay as they are; call
     /// [`PreparedScene::shade`] when light and shadows should follow.
     pub fn place(&mut self, object: usize, transform: &Similarity) {
-        let to_scene =
-            Similarity { translation: transform.translation - self.origin, ..*transform };
+        let to_scene = from_origin(transform, self.origin);
+        self.clouds[object].place(to_scene);
         let object = &mut self.objects[object];
         object.to_scene = to_scene;
         object.positions = to_scene_positions(&object.mesh, &to_scene);
-        let local = object.tree.bounds();
-        let corner = |i: u32| {
-            let pick = |bit: u32, lo: f32, hi: f32| if i >> bit & 1 == 0 { lo } else { hi };
-            DVec3::new(
-                pick(0, local.min.x, local.max.x).into(),
-                pick(1, local.min.y, local.max.y).into(),
-                pick(2, local.min.z, local.max.z).into(),
-            )
-        };
-        let bounds = Aabb::of((0..8).map(|i| to_scene.point(corner(i)).as_vec3()));
-        // The corners were rounded.
-        let slack = (bounds.min.abs().max(bounds.max.abs())) * (2.0 * f32::EPSILON);
-        object.bounds = Aabb { min: bounds.min - slack, max: bounds.max + slack };
     }
 
     /// Rebuilds the triangles' BVH from the objects' places and shades all surfels.
@@ -285,12 +320,12 @@ impl PreparedScene {
             .flat_map(|o| o.mesh.triangles().iter().map(|t| t.map(|i| o.positions[i as usize])))
             .collect();
         self.triangles = TriangleBvh::build(&corners);
-        for object in &self.objects {
-            let range = object.surfels.start as usize..object.surfels.end as usize;
+        for cloud in &self.clouds[..self.objects.len()] {
+            let range = cloud.surfels.start as usize..cloud.surfels.end as usize;
             shade::bake(
                 &mut self.surfels,
                 range,
-                &object.to_scene,
+                &cloud.to_scene,
                 &self.triangles,
                 &self.light,
                 cx,
@@ -302,15 +337,27 @@ impl PreparedScene {
 
     /// Gives the representatives the colours of what they stand for.
     fn average(&mut self) {
-        for object in &self.objects {
-            object.tree.average(&mut self.surfels.radiance, object.surfels.start as usize);
-            object.tree.average(&mut self.surfels.albedo, object.surfels.start as usize);
+        for cloud in &self.clouds[..self.objects.len()] {
+            cloud.tree.average(&mut self.surfels.radiance, cloud.surfels.start as usize);
+            cloud.tree.average(&mut self.surfels.albedo, cloud.surfels.start as usize);
         }
     }
 
     /// Number of surfels over all objects, without representatives.
     pub fn surfel_count(&self) -> usize {
-        self.objects.iter().map(|o| o.surfels.len()).sum()
+        self.clouds[..self.objects.len()].iter().map(|o| o.surfels.len()).sum()
+    }
+
+    /// Mirrors nearer to where a reflected ray starts than this, in scene units, do not hide what it sees: the facets
+    /// of a mirror stand in the way of the rays of its smooth surface.
+    pub fn mirror_clearance(&self) -> f32 {
+        const CLEARANCE: f32 = 5e-3;
+        CLEARANCE * self.mirror_triangles.bounds().diagonal()
+    }
+
+    /// Surfels from this one on are mirrors'.
+    pub fn first_mirror_surfel(&self) -> u32 {
+        self.clouds[..self.objects.len()].last().map_or(0, |cloud| cloud.representatives.end)
     }
 
     /// Number of mirror triangles over all mirrors.
@@ -341,9 +388,9 @@ impl PreparedScene {
         (object, (triangle - self.objects[object].first_triangle) as usize)
     }
 
-    /// The object of a surfel or representative.
-    pub fn object_of_surfel(&self, surfel: u32) -> usize {
-        self.objects.partition_point(|o| o.representatives.end <= surfel)
+    /// The cloud of a surfel or representative.
+    pub fn cloud_of_surfel(&self, surfel: u32) -> usize {
+        self.clouds.partition_point(|o| o.representatives.end <= surfel)
     }
 }
 
@@ -368,14 +415,37 @@ fn sample_objects(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Resu
     Ok(list)
 }
 
+/// Surfels of all mirrors together, at most.
+const MIRROR_SURFELS: usize = 1 << 17;
+
+/// The mirrors' surfels: not more than `most` or so.
+pub(super) fn sample_mirrors(
+    scene: &Scene,
+    most: usize,
+    seed: u64,
+    cx: &Context,
+) -> Result<Vec<Surfels>> {
+    let areas: Vec<f64> =
+        scene.mirrors.iter().map(|m| m.mesh.area() * m.transform.scale.powi(2)).collect();
+    let counts = sample::allot(&areas, &[], most.min(MIRROR_SURFELS));
+    let paint = Paint::Constant(Vec3::ZERO);
+    let of = |(mirror, count): (&Mirror, usize)| {
+        sample::sample(&mirror.mesh, &paint, count, seed, cx)
+    };
+    scene.mirrors.iter().zip(counts).map(of).collect()
+}
+
+fn from_origin(transform: &Similarity, origin: DVec3) -> Similarity {
+    Similarity { translation: transform.translation - origin, ..*transform }
+}
+
 fn prepare_mirrors(scene: &Scene, origin: DVec3) -> Vec<PreparedMirror> {
     let mut first_triangle = 0;
     scene
         .mirrors
         .iter()
         .map(|m| {
-            let to_scene =
-                Similarity { translation: m.transform.translation - origin, ..m.transform };
+            let to_scene = from_origin(&m.transform, origin);
             let mirror = PreparedMirror {
                 name: m.name.clone(),
                 mesh: Arc::clone(&m.mesh),

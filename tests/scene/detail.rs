@@ -38,7 +38,7 @@ fn params(settings: &[(&str, &str)]) -> Params {
 }
 
 /// The surfels of a batch as a range of the object's own.
-fn surfels(object: &PreparedObject, first: u32, count: u32, stride: u32) -> Vec<[u32; 2]> {
+fn surfels(object: &Cloud, first: u32, count: u32, stride: u32) -> Vec<[u32; 2]> {
     let node_range = |w: usize, slots: std::ops::Range<usize>| {
         let node = &object.tree.wide()[w];
         let used: Vec<usize> = slots.filter(|s| node.used >> s & 1 != 0).collect();
@@ -68,7 +68,7 @@ fn surfels(object: &PreparedObject, first: u32, count: u32, stride: u32) -> Vec<
 fn a_representative_is_the_mean_of_its_surfels_and_reaches_them() {
     let scene = setting();
     let (mut checked, mut reached, mut all) = (0, 0, 0);
-    for object in &scene.objects {
+    for object in &scene.clouds[..scene.objects.len()] {
         let from = object.surfels.start as usize;
         for i in object.representatives.clone() {
             let slot = (i - object.representatives.start) as usize % REPRESENTATIVES;

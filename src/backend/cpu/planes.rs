@@ -88,7 +88,7 @@ fn of_patch(
             }
             let surfel = u32::try_from(key & u64::from(u32::MAX)).unwrap_or(NONE);
             let depth = u32::try_from((key & !FILLS) >> 32).unwrap_or(NONE);
-            let object = scene.object_of_surfel(surfel);
+            let object = scene.cloud_of_surfel(surfel);
             let camera = pass.cameras[cameras.clone()].iter().find(|c| c.object as usize == object);
             let Some(camera) = camera else { continue };
             let work = Projection { pass, surfels: &scene.surfels, camera, patch, stride: 0 };

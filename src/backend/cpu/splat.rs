@@ -154,7 +154,8 @@ impl PatchWork<'_> {
         }
         let start = Instant::now();
         if pass.shape == SplatShape::Ellipse {
-            layers.draw(hits, &surfels.radiance, stride as usize, tile);
+            let (list, first_hider) = (&surfels.radiance, pass.first_hider);
+            layers.draw(hits, list, first_hider, stride as usize, tile);
         }
         self.resolve(tile, layers, stride as usize, landed);
         counters.splat_ns += nanoseconds(start, Instant::now());
@@ -177,8 +178,11 @@ impl PatchWork<'_> {
                     _ => {
                         // The low half of a key is its surfel.
                         #[expect(clippy::cast_possible_truncation, reason = "takes the low half")]
-                        let surfel = key as u32 as usize;
-                        self.surfels.radiance[surfel].extend(1.0)
+                        let surfel = key as u32;
+                        if surfel >= self.pass.first_hider {
+                            continue;
+                        }
+                        self.surfels.radiance[surfel as usize].extend(1.0)
                     }
                 };
                 landed.push(Landed {

@@ -16,7 +16,7 @@ use crate::cull::{Tested, test_children};
 use crate::geometry::Similarity;
 use crate::geometry::lanes::simd_level;
 use crate::plan::{CELL_SLACK_PX, CameraInstance, EVENNESS, Gaze, SplatShape, Volume};
-use crate::scene::prepared::{PreparedObject, PreparedScene};
+use crate::scene::prepared::{Cloud, PreparedScene};
 use crate::visibility::Patch;
 
 /// Surfels a hair behind the mirror still count as touching it: this share of the eye's distance (untuned).
@@ -35,6 +35,8 @@ pub(super) struct CameraSettings {
     pub(super) ray_scale: RayScale,
     pub(super) shape: SplatShape,
     pub(super) detail: f64,
+    /// Whether mirrors hide what lies behind them.
+    pub(super) mirror_occlusion: bool,
 }
 
 impl CameraSettings {
@@ -103,9 +105,12 @@ fn of_triangle<'a>(frame: FrameInput<'_>, patch: &'a Patch, scale: RayScale) -> 
     View { patch, rays: whole.part(patch.corners), front, outline: None }
 }
 
-/// The objects' boxes in scene space, eight at a time.
+/// The clouds' boxes in scene space, eight at a time.
 pub(super) struct Top {
-    groups: Vec<WideNode>,
+    objects: Vec<WideNode>,
+    mirrors: Vec<WideNode>,
+    /// Mirrors nearer to where a ray starts than this do not hide what it sees.
+    clearance: f64,
     /// No object is farther from the eye than this.
     reach: f64,
     pub(super) level: Level,
@@ -113,23 +118,31 @@ pub(super) struct Top {
 
 impl Top {
     pub(super) fn new(scene: &PreparedScene, eye: &Eye) -> Self {
-        let mut reach = 0.0f64;
-        let groups = scene
-            .objects
-            .chunks(CHILDREN)
-            .map(|objects| {
-                let mut group = WideNode::EMPTY;
-                for (slot, object) in objects.iter().enumerate() {
-                    group.set_box(slot, object.bounds);
-                    let b = object.bounds;
-                    let far = (b.min - eye.position).abs().max((b.max - eye.position).abs());
-                    reach = reach.max(far.as_dvec3().length());
-                }
-                group
-            })
-            .collect();
-        Self { groups, reach, level: simd_level() }
+        let (objects, mirrors) = scene.clouds.split_at(scene.objects.len());
+        let far = |cloud: &Cloud| {
+            let b = cloud.bounds;
+            let far = (b.min - eye.position).abs().max((b.max - eye.position).abs());
+            far.as_dvec3().length()
+        };
+        Self {
+            objects: groups(objects),
+            mirrors: groups(mirrors),
+            clearance: f64::from(scene.mirror_clearance()),
+            reach: objects.iter().map(far).fold(0.0, f64::max),
+            level: simd_level(),
+        }
     }
+}
+
+fn groups(clouds: &[Cloud]) -> Vec<WideNode> {
+    let of = |clouds: &[Cloud]| {
+        let mut group = WideNode::EMPTY;
+        for (slot, cloud) in clouds.iter().enumerate() {
+            group.set_box(slot, cloud.bounds);
+        }
+        group
+    };
+    clouds.chunks(CHILDREN).map(of).collect()
 }
 
 /// What a view may see at most.
@@ -165,10 +178,9 @@ impl Bounds {
         Some(Self { corners_px, volume: around.volume(rays), lambda })
     }
 
-    fn test(&self, top: &Top, group: &WideNode) -> Tested {
-        let Self { volume, lambda, .. } = self;
-        let (test, lambda) = (BoxTest::Slab, *lambda);
-        match volume {
+    fn test(&self, top: &Top, group: &WideNode, lambda: [f32; 2]) -> Tested {
+        let test = BoxTest::Slab;
+        match &self.volume {
             Volume::Three(v) => {
                 dispatch!(top.level, simd => test_children(simd, group, v, test, lambda))
             }
@@ -187,10 +199,10 @@ pub(super) fn sees_objects(
     settings: CameraSettings,
 ) -> bool {
     Bounds::new(eye, top, view, settings)
-        .is_some_and(|b| top.groups.iter().any(|g| b.test(top, g).meets & g.used != 0))
+        .is_some_and(|b| top.objects.iter().any(|g| b.test(top, g, b.lambda).meets & g.used != 0))
 }
 
-/// Appends the cameras of one view: one for each object that it may see.
+/// Appends the cameras of one view: one for each object that it may see, then one for each mirror that may hide it.
 pub(super) fn of_view(
     frame: FrameInput<'_>,
     top: &Top,
@@ -207,18 +219,35 @@ pub(super) fn of_view(
     let reach = settings.reach();
     // Most patches see no object.
     let mut exact = None;
-    for (g, group) in top.groups.iter().enumerate() {
-        let tested = bounds.test(top, group);
+    let hiders = if settings.mirror_occlusion { &top.mirrors[..] } else { &[] };
+    let length = rays.directions.iter().map(|d| d.length()).sum::<f64>() / 3.0;
+    #[expect(clippy::cast_possible_truncation, reason = "not a sharp limit")]
+    let clear = (top.clearance / length) as f32;
+    let mut farthest = f32::NEG_INFINITY;
+    let groups = top.objects.iter().map(|group| (group, false));
+    for (g, (group, hides)) in groups.chain(hiders.iter().map(|group| (group, true))).enumerate() {
+        // What hides nothing need not be looked at.
+        let lambda = if hides { [clear, farthest] } else { bounds.lambda };
+        if lambda[0] >= lambda[1] {
+            break;
+        }
+        let tested = bounds.test(top, group, lambda);
         let mut bits = tested.meets & group.used;
         while bits != 0 {
             let slot = bits.trailing_zeros() as usize;
             bits &= bits - 1;
-            let object = g * CHILDREN + slot;
-            let to_scene = &scene.objects[object].to_scene;
+            let object = match hides {
+                true => scene.objects.len() + (g - top.objects.len()) * CHILDREN + slot,
+                false => g * CHILDREN + slot,
+            };
+            let cloud = &scene.clouds[object];
+            let to_scene = &cloud.to_scene;
             let range = [tested.lo[slot], tested.hi[slot]];
+            if !hides {
+                farthest = farthest.max(range[1]);
+            }
             let range_f64 = range.map(f64::from);
-            let radius =
-                f64::from(EVENNESS) * to_scene.scale * f64::from(scene.objects[object].extent);
+            let radius = f64::from(EVENNESS) * to_scene.scale * f64::from(cloud.extent);
             let (screen, guard, footprint) = exact.get_or_insert_with(|| {
                 let screen = screen_forms(eye, patch, rays.origins);
                 let guard = match outline {
@@ -272,11 +301,11 @@ pub(super) fn of_view(
                 screen: *screen,
                 per_px: [footprint.base, footprint.per_lambda]
                     .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / radius))),
-                gaze: gaze(&scene.objects[object], &own_grown),
-                representatives: scene.objects[object].representatives.start,
+                gaze: gaze(cloud, &own_grown, hides),
+                representatives: cloud.representatives.start,
                 detail: detail as f32,
                 radius: radius as f32,
-                extent: scene.objects[object].extent,
+                extent: cloud.extent,
                 footprint: {
                     // In the object's space, where the culling is.
                     let per_unit = to_scene.scale.powi(-2);
@@ -363,12 +392,13 @@ fn own_detail(detail: f64, corners: &[DVec3; 3], footprint: &Footprint, range: [
     if needed.is_finite() { detail.max(needed.min(detail * MOST_DETAIL)) } else { detail }
 }
 
-/// See [`CameraInstance::gaze`]. From inside an object its far side is seen from behind.
+/// See [`CameraInstance::gaze`]. From inside an object its far side is seen from behind; `leaves`: the rays start on its
+/// outside or elsewhere.
 #[expect(clippy::cast_possible_truncation, reason = "rounded once, with a margin")]
-fn gaze(object: &PreparedObject, rays: &Rays) -> Option<Gaze> {
-    let bounds = object.tree.bounds();
+fn gaze(cloud: &Cloud, rays: &Rays, leaves: bool) -> Option<Gaze> {
+    let bounds = cloud.tree.bounds();
     let outside = |v: &DVec3| !bounds.contains(v.as_vec3());
-    if !object.closed || !rays.origins.iter().all(outside) {
+    if !cloud.closed || !(leaves || rays.origins.iter().all(outside)) {
         return None;
     }
     let axis = rays.axis()?;

@@ -9,8 +9,8 @@ mod guard;
 use std::time::Instant;
 
 use super::{
-    FrameInput, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, Preset, RAY_SCALE, Value,
-    ray_scale,
+    FrameInput, MIRROR_OCCLUSION, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, Preset,
+    RAY_SCALE, Value, ray_scale,
 };
 use crate::camera::three_ray::BoxTest;
 use crate::cull::Culler;
@@ -68,6 +68,7 @@ static INFO: MethodInfo = MethodInfo {
             is_quality_knob: false,
         },
         RAY_SCALE,
+        MIRROR_OCCLUSION,
         ParamInfo {
             id: "roots",
             about: "images of a point that a camera draws: all, or only the first as in the paper",
@@ -87,6 +88,7 @@ static INFO: MethodInfo = MethodInfo {
                 ("depth", "push-back"),
                 ("ray-scale", "unit"),
                 ("roots", "first"),
+                ("mirror-occlusion", "off"),
             ],
             leaf_points: Some(122),
         },
@@ -123,6 +125,7 @@ impl Method for C3rc {
             ray_scale: ray_scale(params.choice("ray-scale")),
             shape,
             detail: f64::from(detail),
+            mirror_occlusion: params.choice("mirror-occlusion") == "on",
         };
         if params.choice("cameras") == "cells" {
             for (id, value) in [("test", "paper"), ("ray-scale", "unit")] {
@@ -162,6 +165,7 @@ impl Method for C3rc {
                 "push-back" => DepthKey::PushBack,
                 _ => DepthKey::Lambda,
             },
+            first_hider: scene.first_mirror_surfel(),
             first_root_only: params.choice("roots") == "first",
         })));
         out.passes.push(Pass::Resolve);

@@ -19,9 +19,6 @@ use crate::visibility::NONE_ID;
 
 /// Side of the tiles that rays are traced by: neighbours in the list are neighbours in the picture.
 const TILE: usize = 16;
-/// Surfaces nearer than this share of the scene are the mirror's own (its facets stand in the way of the rays of its
-/// smooth surface).
-const CLEARANCE: f32 = 5e-3;
 
 pub(super) struct Kernel<'a> {
     pub(super) frame: FrameInput<'a>,
@@ -143,7 +140,7 @@ impl Kernel<'_> {
         }
         let occlusion = self.mirror_occlusion.then(|| MirrorOcclusion {
             mirrors: &scene.mirror_triangles,
-            clearance: CLEARANCE * scene.mirror_triangles.bounds().diagonal(),
+            clearance: scene.mirror_clearance(),
         });
         let start = Instant::now();
         trace_reflected(&rays, &scene.triangles, occlusion, &mut hits);

@@ -3,7 +3,10 @@
 mod gather;
 pub mod trace;
 
-use super::{FrameInput, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, RAY_SCALE, Value};
+use super::{
+    FrameInput, MIRROR_OCCLUSION, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, RAY_SCALE,
+    Value,
+};
 use crate::camera::mirror_ray::RaySource;
 use crate::error::Result;
 use crate::plan::{GatherPass, Pass, Plan};
@@ -32,14 +35,7 @@ static INFO: MethodInfo = MethodInfo {
             default: Value::Integer(1),
             is_quality_knob: true,
         },
-        ParamInfo {
-            id: "mirror-occlusion",
-            about: "whether mirrors hide what lies behind them from reflected rays, which then see the environment",
-            unit: "",
-            kind: ParamKind::Choice(&["on", "off"]),
-            default: Value::Choice("on"),
-            is_quality_knob: false,
-        },
+        MIRROR_OCCLUSION,
         RAY_SCALE,
     ],
     presets: &[],

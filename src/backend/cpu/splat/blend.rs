@@ -18,18 +18,29 @@ const CLOSING: f32 = 0.4;
 pub(super) struct Layers {
     /// Splats from the nearest on: depth and index.
     order: Vec<u64>,
-    /// Radiance times coverage, and coverage.
+    /// Radiance times coverage, and how full the pixel is.
     sum: Vec<Vec4>,
+    /// The part of that which shows nothing.
+    hidden: Vec<f32>,
     /// First and last column to be drawn, by row; reversed where there is none.
     spans: Vec<[f32; 2]>,
 }
 
 impl Layers {
     /// Draws what was hit into a tile with rows of `stride` slots. Those that are `EMPTY` in `tile` are taken; they
-    /// get the key of their nearest splat.
-    pub(super) fn draw(&mut self, hits: &Hits, radiance: &[Vec3], stride: usize, tile: &mut [u64]) {
+    /// get the key of their nearest splat. Surfels from `first_hider` on show nothing.
+    pub(super) fn draw(
+        &mut self,
+        hits: &Hits,
+        radiance: &[Vec3],
+        first_hider: u32,
+        stride: usize,
+        tile: &mut [u64],
+    ) {
         self.sum.clear();
         self.sum.extend(tile.iter().map(|&key| if key == EMPTY { Vec4::ZERO } else { Vec4::W }));
+        self.hidden.clear();
+        self.hidden.resize(tile.len(), 0.0);
         self.spans.clear();
         self.spans.extend(tile.chunks_exact(stride).map(|row| {
             let own = |key: &u64| *key == EMPTY;
@@ -48,10 +59,19 @@ impl Layers {
             let color = radiance[surfel as usize].extend(1.0);
             let key = next & !u64::from(u32::MAX) | u64::from(surfel);
             let weight = hits.ellipse[WEIGHT][i] * GAIN;
+            if surfel >= first_hider {
+                each(hits, i, stride, &self.spans, |slot, kernel| {
+                    let sum = &mut self.sum[slot];
+                    let part = (kernel * weight).min(1.0 - sum.w).max(0.0);
+                    sum.w += part;
+                    self.hidden[slot] += part;
+                });
+                continue;
+            }
             each(hits, i, stride, &self.spans, |slot, kernel| {
                 let sum = &mut self.sum[slot];
                 if sum.w < 1.0 {
-                    if sum.w == 0.0 {
+                    if tile[slot] == EMPTY {
                         tile[slot] = key;
                     }
                     *sum += color * (kernel * weight).min(1.0 - sum.w);
@@ -64,13 +84,14 @@ impl Layers {
     /// are covered, they lie too far apart there: it is closed. Edges stay.
     pub(super) fn at(&self, slot: usize, stride: usize) -> Vec4 {
         let own = self.sum[slot];
+        let shown = own - Vec4::W * self.hidden[slot];
         if own.w >= 1.0 || own.w < CLOSING {
-            return own;
+            return shown;
         }
         let [left, right, above, below] =
             [slot - 1, slot + 1, slot - stride, slot + stride].map(|i| self.sum[i].w);
         let covered = left.min(right).max(above.min(below)).max(own.w);
-        own * (covered / own.w)
+        shown * (covered / own.w)
     }
 }
 
@@ -155,7 +176,7 @@ mod tests {
         let mut layers = Layers::default();
         let draw = |layers: &mut Layers, list: &[[f32; 5]]| {
             let mut tile = tile();
-            layers.draw(&hits(list), &radiance, 5, &mut tile);
+            layers.draw(&hits(list), &radiance, u32::MAX, 5, &mut tile);
             tile[MIDDLE]
         };
         // A quarter in front, whatever the order; behind it half of one; a third behind both fills the rest.
@@ -180,7 +201,7 @@ mod tests {
         let (x, y, radius) = (2.2f32, 2.7f32, 1.9f32);
         let mut layers = Layers::default();
         let mut tile = tile();
-        layers.draw(&hits(&[[x, y, radius, 0.1, 1.0]]), &[Vec3::ONE], 5, &mut tile);
+        layers.draw(&hits(&[[x, y, radius, 0.1, 1.0]]), &[Vec3::ONE], u32::MAX, 5, &mut tile);
         for row in 0..5 {
             for column in 0..5 {
                 let slot = row * 5 + column;
