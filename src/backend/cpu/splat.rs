@@ -13,7 +13,7 @@ use fearless_simd::{Level, dispatch, f32x16};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use self::blend::Layers;
+use self::blend::{Blended, Layers};
 use self::hits::Hits;
 use self::packed::Packed;
 pub(crate) use self::projection::Projection;
@@ -154,36 +154,45 @@ impl PatchWork<'_> {
         }
         let start = Instant::now();
         if pass.shape == SplatShape::Ellipse {
-            let (list, first_hider) = (&surfels.radiance, pass.first_hider);
-            layers.draw(hits, list, first_hider, stride as usize, tile);
+            let (list, hider, stride) = (&surfels.radiance, pass.first_hider, stride as usize);
+            dispatch!(level, simd => layers.draw(simd, hits, list, hider, stride, tile));
         }
-        self.resolve(tile, layers, stride as usize, landed);
+        self.resolve(tile, hits, layers, stride as usize, landed);
         counters.splat_ns += nanoseconds(start, Instant::now());
         counters
     }
 
     /// From the tile to the patch's pixels.
-    fn resolve(&self, tile: &[u64], layers: &Layers, stride: usize, landed: &mut Vec<Landed>) {
+    fn resolve(
+        &self,
+        tile: &[u64],
+        hits: &Hits,
+        layers: &Layers,
+        stride: usize,
+        landed: &mut Vec<Landed>,
+    ) {
         let rect = self.pass.patches[self.index].rect;
         for y in rect.min[1]..rect.max[1] {
             let row = (y - rect.min[1] + BORDER) as usize * stride + BORDER as usize;
             for x in rect.min[0]..rect.max[0] {
                 let slot = row + (x - rect.min[0]) as usize;
-                let key = tile[slot];
-                if key == EMPTY || key == FOREIGN {
+                let mut key = tile[slot];
+                if key == FOREIGN {
                     continue;
                 }
-                let value = match self.pass.shape {
-                    SplatShape::Ellipse => layers.at(slot, stride),
-                    _ => {
-                        // The low half of a key is its surfel.
-                        #[expect(clippy::cast_possible_truncation, reason = "takes the low half")]
-                        let surfel = key as u32;
-                        if surfel >= self.pass.first_hider {
-                            continue;
-                        }
-                        self.surfels.radiance[surfel as usize].extend(1.0)
+                let value = if self.pass.shape == SplatShape::Ellipse {
+                    let Some(Blended { value, first }) = layers.at(slot) else { continue };
+                    let depth = u64::from(hits.depth[first].to_bits());
+                    key = depth << 32 | u64::from(hits.surfel[first]);
+                    value
+                } else {
+                    // The low half of a key is its surfel.
+                    #[expect(clippy::cast_possible_truncation, reason = "takes the low half")]
+                    let surfel = key as u32;
+                    if key == EMPTY || surfel >= self.pass.first_hider {
+                        continue;
                     }
+                    self.surfels.radiance[surfel as usize].extend(1.0)
                 };
                 landed.push(Landed {
                     pixel: y * self.visibility.size.width + x,

@@ -1,142 +1,278 @@
 //! Ellipses to pixels. Every splat covers parts of pixels; from the nearest on, each pixel takes them until it is full.
 //! So a surface that covers it in part lets through what lies behind it, be it another surface or the environment.
 
+use fearless_simd::{Simd, f32x8};
 use glam::{Vec3, Vec4};
 
 use super::EMPTY;
-use super::hits::Hits;
+use super::hits::{DEPTH_RANGE, FORM, HALF, Hits, MIDDLE, WEIGHT};
+use crate::geometry::lanes::{Real, Vector};
 
 /// How much of a pixel splats cover for each part that their areas say: they are not spread so evenly that the areas
 /// add up everywhere (untuned).
 const GAIN: f32 = 1.3;
-
 /// From this coverage on a gap between covered pixels is closed (untuned).
 const CLOSING: f32 = 0.4;
+/// Of a pixel that is covered, but for rounding.
+const WHOLE: f32 = 0.999_99;
+/// Pixels show one surface if their depths differ by less than this share (untuned).
+const SAME_SURFACE: f32 = 0.02;
+/// Splats drawn before it is asked whether any pixel is still open (untuned).
+const UNTIL_FULL: usize = 32;
+
+/// Values a pixel has, each in a list of its own.
+const PLANES: usize = 8;
+/// How full a pixel is.
+const FULL: usize = 3;
+/// The part of that which shows objects; times their radiance in the first three planes.
+const SHOWN: usize = 4;
+/// Depth of the nearest splat.
+const NEAR: usize = 5;
+/// How full it was when the first splat of a farther surface came; more than 1: none did.
+const FRONT: usize = 6;
+/// Index of the nearest splat that shows an object.
+const FIRST: usize = 7;
 
 /// One patch's pixels, by slot of its tile.
 #[derive(Default)]
 pub(super) struct Layers {
     /// Splats from the nearest on: depth and index.
     order: Vec<u64>,
-    /// Radiance times coverage, and how full the pixel is.
-    sum: Vec<Vec4>,
-    /// The part of that which shows nothing.
-    hidden: Vec<f32>,
+    /// Radiance by splat, gathered at once: one after the other these accesses would each be waited for.
+    colors: Vec<Vec3>,
+    planes: [Vec<f32>; PLANES],
     /// First and last column to be drawn, by row; reversed where there is none.
     spans: Vec<[f32; 2]>,
+    stride: usize,
+}
+
+/// What lands on a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Blended {
+    /// Radiance times coverage, and coverage.
+    pub(super) value: Vec4,
+    /// The nearest splat.
+    pub(super) first: usize,
+}
+
+/// Those columns of a row that a splat covers.
+struct Row {
+    /// Columns from the splat's middle to the centre of the first pixel.
+    dx: f32,
+    slope: f32,
+    rest: f32,
+    /// Slot of the first pixel, and how many there are.
+    at: usize,
+    count: f32,
 }
 
 impl Layers {
-    /// Draws what was hit into a tile with rows of `stride` slots. Those that are `EMPTY` in `tile` are taken; they
-    /// get the key of their nearest splat. Surfels from `first_hider` on show nothing.
-    pub(super) fn draw(
+    /// Draws what was hit into a tile with rows of `stride` slots, of which those that are `EMPTY` are taken. Surfels
+    /// from `first_hider` on show nothing.
+    #[inline(always)]
+    pub(super) fn draw<S: Simd>(
         &mut self,
+        simd: S,
         hits: &Hits,
         radiance: &[Vec3],
         first_hider: u32,
         stride: usize,
-        tile: &mut [u64],
+        tile: &[u64],
     ) {
-        self.sum.clear();
-        self.sum.extend(tile.iter().map(|&key| if key == EMPTY { Vec4::ZERO } else { Vec4::W }));
-        self.hidden.clear();
-        self.hidden.resize(tile.len(), 0.0);
+        self.begin(stride, tile);
+        self.order.clear();
+        self.colors.clear();
+        for (depth, i) in hits.depth[..hits.len].iter().zip(0u32..) {
+            self.order.push(u64::from(depth.to_bits()) << 32 | u64::from(i));
+            let surfel = hits.surfel[i as usize];
+            self.colors.push(radiance[surfel as usize]);
+        }
+        self.order.sort_unstable();
+        for n in 0..self.order.len() {
+            if n % UNTIL_FULL == 0 && n > 0 && self.is_full(simd) {
+                break;
+            }
+            #[expect(clippy::cast_possible_truncation, reason = "the low half")]
+            let i = self.order[n] as u32 as usize;
+            let shows = hits.surfel[i] < first_hider;
+            self.splat(simd, hits, i, self.colors[i], shows);
+        }
+    }
+
+    fn begin(&mut self, stride: usize, tile: &[u64]) {
+        self.stride = stride;
+        // Vectors may reach beyond the last slot.
+        let room = tile.len() + 8;
+        for (plane, list) in self.planes.iter_mut().enumerate() {
+            list.clear();
+            list.resize(room, if plane == FRONT { 2.0 } else { 0.0 });
+        }
+        for (full, &key) in self.planes[FULL].iter_mut().zip(tile) {
+            *full = if key == EMPTY { 0.0 } else { 1.0 };
+        }
+        self.planes[FULL][tile.len()..].fill(1.0);
         self.spans.clear();
-        self.spans.extend(tile.chunks_exact(stride).map(|row| {
+        for row in tile.chunks_exact(stride) {
             let own = |key: &u64| *key == EMPTY;
             let first = row.iter().position(own).unwrap_or(stride);
             let last = row.iter().rposition(own).unwrap_or(0);
-            [first as f32, last as f32]
-        }));
-        self.order.clear();
-        let depths = hits.depth[..hits.len].iter().zip(0u32..);
-        self.order.extend(depths.map(|(d, i)| u64::from(d.to_bits()) << 32 | u64::from(i)));
-        self.order.sort_unstable();
-        for &next in &self.order {
-            #[expect(clippy::cast_possible_truncation, reason = "the low half")]
-            let i = next as u32 as usize;
-            let surfel = hits.surfel[i];
-            let color = radiance[surfel as usize].extend(1.0);
-            let key = next & !u64::from(u32::MAX) | u64::from(surfel);
-            let weight = hits.ellipse[WEIGHT][i] * GAIN;
-            if surfel >= first_hider {
-                each(hits, i, stride, &self.spans, |slot, kernel| {
-                    let sum = &mut self.sum[slot];
-                    let part = (kernel * weight).min(1.0 - sum.w).max(0.0);
-                    sum.w += part;
-                    self.hidden[slot] += part;
-                });
-                continue;
-            }
-            each(hits, i, stride, &self.spans, |slot, kernel| {
-                let sum = &mut self.sum[slot];
-                if sum.w < 1.0 {
-                    if tile[slot] == EMPTY {
-                        tile[slot] = key;
-                    }
-                    *sum += color * (kernel * weight).min(1.0 - sum.w);
-                }
-            });
+            self.spans.push([first as f32, last as f32]);
         }
     }
 
-    /// Radiance, weighted by coverage, and coverage of a slot. Where splats leave a part open between two pixels that
-    /// are covered, they lie too far apart there: it is closed. Edges stay.
-    pub(super) fn at(&self, slot: usize, stride: usize) -> Vec4 {
-        let own = self.sum[slot];
-        let shown = own - Vec4::W * self.hidden[slot];
-        if own.w >= 1.0 || own.w < CLOSING {
-            return shown;
+    #[inline(always)]
+    fn is_full<S: Simd>(&self, simd: S) -> bool {
+        let mut least: f32x8<S> = Vector::broadcast(simd, 1.0);
+        for eight in self.planes[FULL].chunks_exact(8) {
+            least = least.min(Vector::load(simd, eight));
         }
-        let [left, right, above, below] =
-            [slot - 1, slot + 1, slot - stride, slot + stride].map(|i| self.sum[i].w);
-        let covered = left.min(right).max(above.min(below)).max(own.w);
-        shown * (covered / own.w)
+        !f32x8::<S>::any(least.lt(Vector::broadcast(simd, WHOLE)))
     }
-}
 
-/// Index of a splat's weight in [`Hits::ellipse`].
-const WEIGHT: usize = 7;
-
-/// Calls `touch` with every slot within `spans` (by row) that a splat reaches, and its kernel there.
-#[inline(always)]
-fn each(
-    hits: &Hits,
-    i: usize,
-    stride: usize,
-    spans: &[[f32; 2]],
-    mut touch: impl FnMut(usize, f32),
-) {
-    let e = &hits.ellipse;
-    let (x, y, a, b, c) = (e[0][i], e[1][i], e[2][i], e[3][i], e[4][i]);
-    let high = e[6][i];
-    // Centres of pixels lie half a pixel behind their index. Not negative: casts truncate, which is floor.
-    let first = (y - high - 0.5).ceil().max(0.0);
-    let last = (y + high - 0.5).min(spans.len() as f32 - 1.0);
-    let inverse = 1.0 / a;
-    let mut row = first;
-    while row <= last {
-        let dy = row + 0.5 - y;
-        let (slope, rest) = (2.0 * b * dy, c * dy * dy);
-        // Between the roots of 1 = a dx² + slope dx + rest.
-        let middle = -0.5 * slope * inverse;
-        let half = ((1.0 - rest) * inverse + middle * middle).max(0.0).sqrt();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "see above")]
-        let [left, right] = spans[row as usize];
-        let mut column = (x + middle - half - 0.5).ceil().max(left);
-        let end = (x + middle + half - 0.5).min(right);
-        while column <= end {
-            let dx = column + 0.5 - x;
-            let inside = (1.0 - (dx * (a * dx + slope) + rest)).max(0.0);
+    #[inline(always)]
+    fn splat<S: Simd>(&mut self, simd: S, hits: &Hits, i: usize, color: Vec3, shows: bool) {
+        let e = &hits.ellipse;
+        let (x, y) = (e[MIDDLE][i], e[MIDDLE + 1][i]);
+        let (a, b, c) = (e[FORM][i], e[FORM + 1][i], e[FORM + 2][i]);
+        let high = e[HALF + 1][i];
+        let inverse = 1.0 / a;
+        // Centres of pixels lie half a pixel behind their index. Not negative: casts truncate, which is floor.
+        let mut row = (y - high - 0.5).ceil().max(0.0);
+        let last = (y + high - 0.5).min(self.spans.len() as f32 - 1.0);
+        while row <= last {
+            let dy = row + 0.5 - y;
+            let (slope, rest) = (2.0 * b * dy, c * dy * dy);
+            // Between the roots of 1 = a dx² + slope dx + rest.
+            let middle = -0.5 * slope * inverse;
+            let half = ((1.0 - rest) * inverse + middle * middle).max(0.0).sqrt();
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
                 reason = "see above"
             )]
-            touch(row as usize * stride + column as usize, inside * inside);
-            column += 1.0;
+            let index = row as usize;
+            let [left, right] = self.spans[index];
+            let column = (x + middle - half - 0.5).ceil().max(left);
+            let end = (x + middle + half - 0.5).min(right);
+            if column <= end {
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "see above"
+                )]
+                let at = index * self.stride + column as usize;
+                let row =
+                    Row { dx: column + 0.5 - x, slope, rest, at, count: end - column + 1.0 };
+                self.row(simd, hits, i, a, &row, color, shows);
+            }
+            row += 1.0;
         }
-        row += 1.0;
+    }
+
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "the innermost loop: all of it in registers")]
+    fn row<S: Simd>(
+        &mut self,
+        simd: S,
+        hits: &Hits,
+        i: usize,
+        a: f32,
+        row: &Row,
+        color: Vec3,
+        shows: bool,
+    ) {
+        const COLUMNS: [f32; 8] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+        let [red, green, blue, full, shown, near, front, first] = &mut self.planes;
+        let depth = hits.depth[i];
+        let columns: f32x8<S> = Vector::load(simd, &COLUMNS);
+        let zero: f32x8<S> = Vector::broadcast(simd, 0.0);
+        let one: f32x8<S> = Vector::broadcast(simd, 1.0);
+        let weight = f32x8::<S>::broadcast(simd, hits.ellipse[WEIGHT][i] * GAIN);
+        let farther = f32x8::<S>::broadcast(simd, depth - hits.ellipse[DEPTH_RANGE][i]);
+        let depth = f32x8::<S>::broadcast(simd, depth);
+        let mut done = 0.0;
+        let mut at = row.at;
+        while done < row.count {
+            let dx = columns + (row.dx + done);
+            let inside = (one - (dx * (dx * a + row.slope) + row.rest)).max(zero);
+            let was: f32x8<S> = Vector::load(simd, &full[at..]);
+            let part = (inside * inside * weight).min(one - was);
+            let mine = Real::lt(columns + done, Real::splat(one, row.count)) & zero.lt(part);
+            if f32x8::<S>::any(mine) {
+                let part = Real::select(mine, part, zero);
+                Vector::store(was + part, &mut full[at..]);
+                let fresh = mine & was.le(zero);
+                let mut nearest: f32x8<S> = Vector::load(simd, &near[at..]);
+                if f32x8::<S>::any(fresh) {
+                    nearest = Real::select(fresh, depth, nearest);
+                    Vector::store(nearest, &mut near[at..]);
+                }
+                let so_far: f32x8<S> = Vector::load(simd, &front[at..]);
+                let behind = mine & nearest.lt(farther) & one.lt(so_far);
+                if f32x8::<S>::any(behind) {
+                    Vector::store(Real::select(behind, was, so_far), &mut front[at..]);
+                }
+                if shows {
+                    let showed: f32x8<S> = Vector::load(simd, &shown[at..]);
+                    let unseen = mine & showed.le(zero);
+                    if f32x8::<S>::any(unseen) {
+                        let was: f32x8<S> = Vector::load(simd, &first[at..]);
+                        let index = f32x8::<S>::broadcast(simd, i as f32);
+                        Vector::store(Real::select(unseen, index, was), &mut first[at..]);
+                    }
+                    Vector::store(showed + part, &mut shown[at..]);
+                    let was: f32x8<S> = Vector::load(simd, &red[at..]);
+                    Vector::store(was + part * color.x, &mut red[at..]);
+                    let was: f32x8<S> = Vector::load(simd, &green[at..]);
+                    Vector::store(was + part * color.y, &mut green[at..]);
+                    let was: f32x8<S> = Vector::load(simd, &blue[at..]);
+                    Vector::store(was + part * color.z, &mut blue[at..]);
+                }
+            }
+            done += 8.0;
+            at += 8;
+        }
+    }
+
+    /// What landed on a slot. Where splats leave a part of the front open between two pixels that show the same
+    /// surface, they lie too far apart there: it is closed. Edges stay.
+    pub(super) fn at(&self, slot: usize) -> Option<Blended> {
+        let get = |plane: usize, slot: usize| self.planes[plane][slot];
+        let value =
+            |slot: usize| Vec4::new(get(0, slot), get(1, slot), get(2, slot), get(SHOWN, slot));
+        let own = value(slot);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "an index, exact below 2^24"
+        )]
+        let first = get(FIRST, slot) as usize;
+        let found = |value: Vec4| (value.w > 0.0).then_some(Blended { value, first });
+        let beside =
+            [(slot - 1, slot + 1), (slot - self.stride, slot + self.stride)];
+        let full = get(FULL, slot);
+        let mut own = own;
+        if (CLOSING..WHOLE).contains(&full) {
+            let covered = beside.map(|(a, b)| get(FULL, a).min(get(FULL, b)));
+            own *= covered[0].max(covered[1]).max(full) / full;
+        }
+        let front = get(FRONT, slot);
+        if (CLOSING..WHOLE).contains(&front) {
+            let near = get(NEAR, slot);
+            let mut closed = front;
+            let mut between = own;
+            for (a, b) in beside {
+                let alike = |other: usize| (get(NEAR, other) - near).abs() <= SAME_SURFACE * near;
+                let of_front = |slot: usize| get(FRONT, slot).min(get(FULL, slot));
+                let covered = of_front(a).min(of_front(b));
+                if covered > closed && alike(a) && alike(b) {
+                    closed = covered;
+                    between = (value(a) + value(b)) * 0.5;
+                }
+            }
+            own = own.lerp(between, (closed - front) / (1.0 - front));
+        }
+        found(own)
     }
 }
 

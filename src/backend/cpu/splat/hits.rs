@@ -12,10 +12,22 @@ pub(super) struct Hits {
     pub(super) depth: Vec<f32>,
     pub(super) surfel: Vec<u32>,
     pub(super) len: usize,
-    /// Of ellipses instead of `cell`: the middle, the form a x² + 2 b x y + c y² that is 1 at the rim, half the
-    /// width and height, the part of a pixel that it covers in the middle.
-    pub(super) ellipse: [Vec<f32>; 8],
+    /// Of ellipses instead of `cell`: see the constants.
+    pub(super) ellipse: [Vec<f32>; ELLIPSE],
 }
+
+/// Where the middle, x and y, stands in [`Hits::ellipse`].
+pub(super) const MIDDLE: usize = 0;
+/// The form a x² + 2 b x y + c y², which is 1 at the rim.
+pub(super) const FORM: usize = 2;
+/// Half the width and height.
+pub(super) const HALF: usize = 5;
+/// The part of a pixel that it covers in the middle.
+pub(super) const WEIGHT: usize = 7;
+/// What lies farther in front of it than this is another surface.
+pub(super) const DEPTH_RANGE: usize = 8;
+/// Values of an ellipse.
+pub(super) const ELLIPSE: usize = 9;
 
 impl Hits {
     /// Makes room for so many more.

@@ -76,6 +76,8 @@ const PER_DISK: f32 = 1.0 / (EVENNESS * EVENNESS);
 const LEAST_FACING: f32 = 0.2;
 /// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
 const MOST_CORRECTION_PX: f32 = 2.0;
+/// Surfels within so many of their radii in depth show one surface (untuned).
+const SAME_SURFACE: f32 = 3.0;
 /// Of any vector.
 const MOST_LANES: usize = 32;
 
@@ -188,7 +190,8 @@ impl Projection<'_> {
                     if !V::any(lands) {
                         continue;
                     }
-                    let values = [x, y, form[0], form[1], form[2], wide, high, weight];
+                    let range = V::broadcast(simd, SAME_SURFACE * self.camera.radius) / size.sqrt();
+                    let values = [x, y, form[0], form[1], form[2], wide, high, weight, range];
                     for (value, list) in values.into_iter().zip(&mut hits.ellipse) {
                         value.compress(lands, &mut list[len..]);
                     }
