@@ -187,7 +187,7 @@ impl Renderer {
             projections: splats.then_some(done.projections),
             valid: splats.then_some(done.valid),
             mirror_pixels: self.visibility.mirror_ids.iter().filter(|&&id| id != NONE_ID).count(),
-            covered_pixels: self.reflection.coverage.iter().filter(|&&c| c > 0.0).count(),
+            covered_pixels: self.reflection.coverage.iter().filter(|&&c| c >= 0.5).count(),
             cameras_ms: splats.then_some(plan.times.cameras_ms),
             cull_ms: done.cull_ms,
             project_ms: done.project_ms,

@@ -94,7 +94,7 @@ fn run(cli: &Cli, matches: &clap::ArgMatches, cx: &Context) -> anyhow::Result<()
 fn built_in_scene(cx: &Context) -> anyhow::Result<()> {
     let args = RenderArgs {
         scene: SceneArgs::default_scene(),
-        how: HowArgs { method: "c3rc".into(), backend: "auto".into(), preset: None },
+        how: HowArgs { method: "c3rc".into(), backend: "auto".into(), preset: None, quality: "default".into() },
         output: "catoptric.png".into(),
         aov: None,
         json: None,

@@ -26,7 +26,7 @@ pub struct CameraInstance {
     pub screen: [[f32; 3]; 3],
     /// How the point at λ moves in scene space with the place on the screen that sees it, a pixel to the right and a
     /// pixel down: `per_px[0]` + λ `per_px[1]`. The unit is the distance within which every point of the object's
-    /// surface has a surfel; 0 if that is not known, not numbers if the triangle has no area on the screen.
+    /// surface has a surfel; not numbers if the triangle has no area on the screen.
     pub per_px: [[[f32; 3]; 2]; 2],
     /// Where the rays go, if what faces away from all of them is hidden.
     pub gaze: Option<Gaze>,
@@ -36,7 +36,7 @@ pub struct CameraInstance {
     pub detail: f32,
     /// What `per_px` is measured in, scene units.
     pub radius: f32,
-    /// Radius of the disk that the object's surfels stand for; infinite if that is not known.
+    /// Radius of the disk that the object's surfels stand for.
     pub extent: f32,
     /// What a pixel sees at λ: the symmetric matrix [a b; b c] that gives the squared distance across the rays of
     /// two points by their distance in pixels; each a quadratic in λ, by power.

@@ -218,10 +218,10 @@ pub(crate) fn with_method_flags(mut command: Command) -> Command {
 
 /// The method of that name with the parameters that the flags give it.
 pub(crate) fn chosen_method(
-    id: &str,
-    preset: Option<&str>,
+    how: &render::HowArgs,
     matches: &ArgMatches,
 ) -> Result<(&'static dyn Method, Params, Option<u32>)> {
+    let id = how.method.as_str();
     let ids: Vec<&str> = METHODS.iter().map(|m| m.info().id).collect();
     let chosen = method(id).ok_or_else(|| {
         Error::input(
@@ -234,8 +234,8 @@ pub(crate) fn chosen_method(
     let info = chosen.info();
     let mut params = Params::defaults(info.params);
     let mut leaf = None;
-    if let Some(name) = preset {
-        let preset = info.presets.iter().find(|p| p.id == name).ok_or_else(|| {
+    if let Some(name) = &how.preset {
+        let preset = info.presets.iter().find(|p| p.id == *name).ok_or_else(|| {
             let names: Vec<&str> = info.presets.iter().map(|p| p.id).collect();
             let remedy = if names.is_empty() {
                 "leave it out".into()
@@ -246,6 +246,11 @@ pub(crate) fn chosen_method(
         })?;
         leaf = preset.leaf_points;
         for (param, value) in preset.params {
+            params.set(info.param(param), value)?;
+        }
+    }
+    for quality in info.qualities.iter().filter(|q| q.id == how.quality) {
+        for (param, value) in quality.params {
             params.set(info.param(param), value)?;
         }
     }

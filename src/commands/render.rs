@@ -46,6 +46,10 @@ pub(crate) struct HowArgs {
     /// Named set of parameters (paper: everything as Mei et al. had it)
     #[arg(long, value_name = "NAME")]
     pub(crate) preset: Option<String>,
+    /// Time against error: sets the method's parameters for that together
+    #[arg(long, value_name = "WORD", default_value = "default", conflicts_with = "preset",
+        value_parser = ["draft", "default", "best"])]
+    pub(crate) quality: String,
 }
 
 pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyhow::Result<()> {
@@ -60,7 +64,7 @@ pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyh
         ("--json", args.json.as_deref()),
     ])?;
     let (method, params, leaf) =
-        chosen_method(&args.how.method, args.how.preset.as_deref(), matches)?;
+        chosen_method(&args.how, matches)?;
     let ready = args.scene.ready(leaf, cx)?;
     let mut renderer = Renderer::new();
     if !args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {

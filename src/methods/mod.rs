@@ -29,6 +29,8 @@ pub struct MethodInfo {
     pub params: &'static [ParamInfo],
     /// Named sets of values.
     pub presets: &'static [Preset],
+    /// Less time or less error than the defaults, by how much of each: named `draft` and `best`.
+    pub qualities: &'static [Preset],
 }
 
 /// The parameter of all methods that use the camera's rays.

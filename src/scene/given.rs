@@ -36,7 +36,7 @@ impl PreparedScene {
     ///
     /// The object has no triangles: only methods that project surfels show it. The direct view and the
     /// rays of `raytrace` do not see it, and it casts no shadows. Its surfels keep their radiance, also if
-    /// the scene is shaded again.
+    /// the scene is shaded again. How far they lie apart is taken from their places.
     ///
     /// # Errors
     /// [`Error::Input`] if the slices are empty, too long or differ in length, an element is not finite
@@ -181,7 +181,7 @@ mod tests {
         let mut scene = scene(given, EYE).unwrap();
         assert!(render(&scene, "c3rc").covered_pixels > 100);
         assert_eq!(render(&scene, "raytrace").covered_pixels, 0);
-        assert!(scene.surfels.normals.iter().all(|&n| n == Vec3::Y));
+        assert!(scene.surfels.normals[..floor.len()].iter().all(|&n| n == Vec3::Y));
         let before = scene.surfels.radiance.clone();
         scene.shade(&Context::default()).unwrap();
         assert_eq!(scene.surfels.radiance, before);
@@ -191,8 +191,14 @@ mod tests {
     fn a_single_surfel_will_do() {
         let at = [Vec3::new(0.3, 0.3, 2.0)];
         let given = GivenSurfels { positions: &at, normals: &[Vec3::X], radiance: &[Vec3::ONE] };
-        let report = render(&scene(given, EYE).unwrap(), "c3rc");
-        assert!((1..=4).contains(&report.covered_pixels), "{report:?}");
+        let scene = scene(given, EYE).unwrap();
+        let eye = scene.eye_for(ImageSize { width: 160, height: 90 }).unwrap();
+        let params = Params::defaults(method("c3rc").unwrap().info().params);
+        let mut renderer = Renderer::new();
+        let cx = Context::default();
+        renderer.render(&scene, &eye, method("c3rc").unwrap(), &params, true, &cx).unwrap();
+        let seen = renderer.planes().unwrap().coverage.iter().filter(|c| **c > 0.0).count();
+        assert!((1..=16).contains(&seen), "{seen}");
     }
 
     #[test]

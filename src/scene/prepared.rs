@@ -97,7 +97,7 @@ pub struct Cloud {
     pub representatives: Range<u32>,
     /// The surface encloses something with outward normals: from outside, what faces away is hidden.
     pub closed: bool,
-    /// Largest radius that one of its surfels stands for, own space; infinite if that is not known.
+    /// Largest radius that one of its surfels stands for, own space.
     pub extent: f32,
     /// Contains its surfels, scene space.
     pub bounds: Aabb,
@@ -107,10 +107,12 @@ impl Cloud {
     /// Appends `own` to `all`, in leaf order and followed by its representatives.
     fn new(mut own: Surfels, closed: bool, limits: KdTreeLimits, all: &mut Surfels) -> Self {
         let mut tree = KdTree::build(&mut own, limits);
+        if own.extent.iter().all(|&extent| extent == 0.0) {
+            own.extent.fill(tree.spacing_extent());
+        }
         let first = index(all.len());
         let count = index(own.len());
-        let known = |e: f32| if e > 0.0 { e } else { f32::INFINITY };
-        let extent = own.extent.iter().copied().map(known).fold(0.0, f32::max);
+        let extent = own.extent.iter().copied().fold(0.0, f32::max);
         tree.append_representatives(&mut own);
         append(all, own);
         Self {

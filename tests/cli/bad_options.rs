@@ -66,7 +66,7 @@ fn options_of_methods() {
             "--cameras cells --test paper",
             "--test paper: goes with triangles only; use --cameras triangles, or another --test",
         ),
-        ("--preset smooth --ray-scale unit", "--ray-scale unit: goes with triangles only; "),
+        ("--ray-scale unit", "--ray-scale unit: goes with triangles only; "),
         ("--method raytrace --spp 0", "--spp: \"0\" is not a whole number from 1 to 65536"),
         ("--method raytrace --spp 1.5", "--spp: \"1.5\" is not a whole number"),
         ("--method raytrace --spp 4000000000", "--spp: \"4000000000\" is not a whole number"),

@@ -40,19 +40,20 @@ fn same(method: &str) {
 
 #[test]
 fn by_three_ray_cameras() {
-    same("c3rc");
+    same("c3rc --cameras triangles --splat square2 --detail 0");
 }
 
 #[test]
 fn with_level_of_detail() {
-    same("c3rc --splat ellipse --detail 4");
+    same("c3rc --cameras triangles --splat ellipse --detail 4");
+    same("c3rc --quality draft");
 }
 
 #[test]
 fn with_cells() {
-    same("c3rc --preset smooth");
+    same("c3rc --quality best");
     same("c3rc --cameras cells --splat square1");
-    same("c3rc --cameras cells");
+    same("c3rc");
 }
 
 #[test]

@@ -104,8 +104,7 @@ fn check(scene: &PreparedScene, eye: &Eye) -> (usize, f64) {
     // Whatever a ray meets an object from has a camera.
     let mut renderer = Renderer::new();
     let raytrace = method("raytrace").unwrap();
-    let mut params = Params::defaults(raytrace.info().params);
-    params.set(raytrace.info().param("mirror-occlusion"), "off").unwrap();
+    let params = Params::defaults(raytrace.info().params);
     renderer.render(scene, eye, raytrace, &params, true, &Context::default()).unwrap();
     let truth = renderer.planes().unwrap();
     let mut seeing = 0;

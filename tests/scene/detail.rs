@@ -8,7 +8,7 @@ use catoptric::image::Planes;
 use catoptric::methods::{FrameInput, Params, method};
 use catoptric::plan::{Pass, Plan};
 use catoptric::scene::PreparedScene;
-use catoptric::scene::prepared::PreparedObject;
+use catoptric::scene::prepared::Cloud;
 use catoptric::visibility::{Scratch, Visibility};
 use glam::{DVec3, Vec3};
 
@@ -116,7 +116,12 @@ fn every_surfel_is_stood_for_once() {
     let c3rc = method("c3rc").unwrap();
     // For each camera: the ranges that it projects, and how many surfels and representatives that is.
     let ranges = |detail: &str| {
-        let params = params(&[("detail", detail)]);
+        let params = params(&[
+            ("cameras", "triangles"),
+            ("splat", "square2"),
+            ("detail", detail),
+            ("mirror-occlusion", "off"),
+        ]);
         let made = c3rc.prepare(&scene, &params, &Context::default()).unwrap();
         let mut plan = Plan::default();
         let input = FrameInput { scene: &scene, eye: &eye, visibility: &visibility };
@@ -126,7 +131,7 @@ fn every_surfel_is_stood_for_once() {
         let mut origins = Vec::new();
         let mut projected = 0;
         for camera in &pass.cameras {
-            let object = &scene.objects[camera.object as usize];
+            let object = &scene.clouds[camera.object as usize];
             let mut batches = Vec::new();
             pass.batches.cull(camera, &mut batches);
             projected += batches.iter().map(|b| b.count as usize).sum::<usize>();
@@ -161,7 +166,7 @@ fn every_surfel_is_stood_for_once() {
                 knots += 1;
                 if !held(k) {
                     skipped += 1;
-                    let i = (scene.objects[1].surfels.start + k) as usize;
+                    let i = (scene.clouds[1].surfels.start + k) as usize;
                     let away = scene.surfels.normals[i].dot(scene.surfels.position(i) - origin);
                     assert!(away > 0.0, "surfel {k} faces the mirror");
                 }
@@ -206,9 +211,11 @@ fn ellipses_and_representatives_keep_to_the_truth() {
         (covered, f64::from(mean) / whole.len() as f64, squares)
     };
     let ellipses = |cameras: &'static str, detail: &'static str| {
-        render("c3rc", &[("cameras", cameras), ("splat", "ellipse"), ("detail", detail)])
+        let settings = [("splat", "ellipse"), ("detail", detail), ("mirror-occlusion", "off")];
+        render("c3rc", &[&[("cameras", cameras)], &settings[..]].concat())
     };
-    let squares = render("c3rc", &[]);
+    let squares = [("cameras", "triangles"), ("splat", "square2"), ("detail", "0")];
+    let squares = render("c3rc", &[&squares[..], &[("mirror-occlusion", "off")]].concat());
     for (cameras, truth) in
         [("triangles", traced("camera", "64")), ("cells", traced("surface", "64"))]
     {

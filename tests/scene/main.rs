@@ -83,8 +83,21 @@ fn eye(scene: &PreparedScene, width: u32, height: u32) -> Eye {
 
 /// A picture and its planes, by a method with its default parameters.
 fn rendered(scene: &PreparedScene, id: &str, width: u32, height: u32) -> (Picture, Planes) {
+    rendered_with(scene, id, &[], width, height)
+}
+
+fn rendered_with(
+    scene: &PreparedScene,
+    id: &str,
+    settings: &[(&str, &str)],
+    width: u32,
+    height: u32,
+) -> (Picture, Planes) {
     let method = method(id).unwrap();
-    let params = Params::defaults(method.info().params);
+    let mut params = Params::defaults(method.info().params);
+    for (name, value) in settings {
+        params.set(method.info().param(name), value).unwrap();
+    }
     let mut renderer = Renderer::new();
     renderer.keep_bright();
     let eye = eye(scene, width, height);

@@ -51,7 +51,7 @@ fn a_hundred_moves_build_nothing_and_end_as_if_there_had_been_none() {
     let cx = Context::default();
     let mut moving = prepared(&knot_near_a_ball(first), SURFELS);
     let builds = moving.tree_builds;
-    assert_eq!(builds, 3, "one tree an object");
+    assert_eq!(builds, 4, "one tree an object and mirror");
     let before = picture(&moving);
     let surfels = moving.surfels.clone();
     for i in 1..=100_u32 {

@@ -110,6 +110,27 @@ impl KdTree {
         self.nodes[0].bounds
     }
 
+    /// Radius of a disk of the area that a surfel has to itself, as the leaves' boxes tell: nine of ten leaves need no
+    /// larger one.
+    pub fn spacing_extent(&self) -> f32 {
+        let of_leaf = |node: &Node| {
+            let [a, b, c] = node.bounds.extent().to_array();
+            let (longest, n) = (a.max(b).max(c), node.count as f32);
+            let second = (a + b + c - longest - a.min(b).min(c)).max(longest / n);
+            // A square of k x k surfels reaches over k - 1 spacings.
+            (longest * second).sqrt() / (n.sqrt() - 1.0).max(0.5)
+        };
+        let leaves = self.nodes.iter().filter(|node| node.right == 0 && node.count > 1);
+        let mut spacings: Vec<f32> = leaves.map(of_leaf).filter(|s| *s > 0.0).collect();
+        // Of one surfel, or several at one place, nothing is known.
+        let Some(last) = spacings.len().checked_sub(1) else {
+            let Aabb { min, max } = self.bounds();
+            return (0.01 * min.abs().max(max.abs()).max_element()).max(f32::MIN_POSITIVE.sqrt());
+        };
+        let (_, spacing, _) = spacings.select_nth_unstable_by(last * 9 / 10, f32::total_cmp);
+        *spacing / std::f32::consts::PI.sqrt()
+    }
+
     /// Leaves, depth and filling.
     pub fn statistics(&self) -> KdTreeStatistics {
         let mut depths = Vec::with_capacity(64);

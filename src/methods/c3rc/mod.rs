@@ -32,7 +32,7 @@ static INFO: MethodInfo = MethodInfo {
             about: "what one camera sees for: a triangle of the mirror, or pixels whose exact rays are nearly linear",
             unit: "",
             kind: ParamKind::Choice(&["triangles", "cells"]),
-            default: Value::Choice("triangles"),
+            default: Value::Choice("cells"),
             is_quality_knob: true,
         },
         ParamInfo {
@@ -48,7 +48,7 @@ static INFO: MethodInfo = MethodInfo {
             about: "pixels that a surfel covers: those that its disk is seen on, in part, the one it falls on, or 2 x 2",
             unit: "",
             kind: ParamKind::Choice(&["ellipse", "square1", "square2"]),
-            default: Value::Choice("square2"),
+            default: Value::Choice("ellipse"),
             is_quality_knob: true,
         },
         ParamInfo {
@@ -56,7 +56,7 @@ static INFO: MethodInfo = MethodInfo {
             about: "splats a pixel and layer: what would be more is drawn as representatives; 0: every surfel",
             unit: "",
             kind: ParamKind::Integer(0, 64),
-            default: Value::Integer(0),
+            default: Value::Integer(1),
             is_quality_knob: true,
         },
         ParamInfo {
@@ -83,8 +83,10 @@ static INFO: MethodInfo = MethodInfo {
             id: "paper",
             about: "as Mei et al.: unit rays, their box test, leaves of 122, 1-pixel squares, first root, push-back depth",
             params: &[
+                ("cameras", "triangles"),
                 ("test", "paper"),
                 ("splat", "square1"),
+                ("detail", "0"),
                 ("depth", "push-back"),
                 ("ray-scale", "unit"),
                 ("roots", "first"),
@@ -92,10 +94,18 @@ static INFO: MethodInfo = MethodInfo {
             ],
             leaf_points: Some(122),
         },
+    ],
+    qualities: &[
         Preset {
-            id: "smooth",
-            about: "exact rays, ellipses that cover pixels in part, representatives: smooth edges, no moiré",
-            params: &[("cameras", "cells"), ("splat", "ellipse"), ("detail", "2")],
+            id: "draft",
+            about: "a camera a triangle, squares of 2 x 2 pixels, one splat a pixel",
+            params: &[("cameras", "triangles"), ("splat", "square2"), ("detail", "1")],
+            leaf_points: None,
+        },
+        Preset {
+            id: "best",
+            about: "four ellipses a pixel",
+            params: &[("cameras", "cells"), ("splat", "ellipse"), ("detail", "4")],
             leaf_points: None,
         },
     ],

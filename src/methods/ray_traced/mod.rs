@@ -4,8 +4,8 @@ mod gather;
 pub mod trace;
 
 use super::{
-    FrameInput, MIRROR_OCCLUSION, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, RAY_SCALE,
-    Value,
+    FrameInput, MIRROR_OCCLUSION, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, Preset,
+    RAY_SCALE, Value,
 };
 use crate::camera::mirror_ray::RaySource;
 use crate::error::Result;
@@ -39,6 +39,10 @@ static INFO: MethodInfo = MethodInfo {
         RAY_SCALE,
     ],
     presets: &[],
+    qualities: &[
+        Preset { id: "draft", about: "1 ray a pixel", params: &[("spp", "1")], leaf_points: None },
+        Preset { id: "best", about: "16 rays a pixel", params: &[("spp", "16")], leaf_points: None },
+    ],
 };
 
 impl Method for RayTraced {

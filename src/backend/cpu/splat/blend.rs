@@ -278,8 +278,11 @@ impl Layers {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::dispatch;
+
     use super::super::FOREIGN;
     use super::*;
+    use crate::geometry::lanes::simd_level;
 
     /// A round splat: its middle, radius, weight in the middle and depth; its surfel is its number.
     fn hits(list: &[[f32; 5]]) -> Hits {
@@ -287,7 +290,7 @@ mod tests {
         hits.reserve(list.len());
         for (i, &[x, y, radius, weight, depth]) in list.iter().enumerate() {
             let form = 1.0 / (radius * radius);
-            let values = [x, y, form, 0.0, form, radius, radius, weight];
+            let values = [x, y, form, 0.0, form, radius, radius, weight, 0.5];
             for (list, value) in hits.ellipse.iter_mut().zip(values) {
                 list[i] = value;
             }
@@ -304,40 +307,63 @@ mod tests {
         (0..25).map(|i| if own(i) { EMPTY } else { FOREIGN }).collect()
     }
 
-    const MIDDLE: usize = 12;
+    const SLOT: usize = 12;
+
+    fn draw(list: &[[f32; 5]], radiance: &[Vec3], first_hider: u32) -> Layers {
+        let mut layers = Layers::default();
+        let (hits, tile) = (hits(list), tile());
+        dispatch!(simd_level(), simd => layers.draw(simd, &hits, radiance, first_hider, 5, &tile));
+        layers
+    }
+
+    const COLORS: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
+
+    fn is(blended: Option<Blended>, r: f32, g: f32, b: f32, coverage: f32) -> bool {
+        blended.unwrap().value.abs_diff_eq(Vec4::new(r, g, b, coverage), 1e-6)
+    }
 
     #[test]
     fn the_nearest_fill_a_pixel_and_the_rest_shows_through() {
-        let radiance = [Vec3::X, Vec3::Y, Vec3::Z];
-        let mut layers = Layers::default();
-        let draw = |layers: &mut Layers, list: &[[f32; 5]]| {
-            let mut tile = tile();
-            layers.draw(&hits(list), &radiance, u32::MAX, 5, &mut tile);
-            tile[MIDDLE]
-        };
         // A quarter in front, whatever the order; behind it half of one; a third behind both fills the rest.
         let parts = [
             [2.5, 2.5, 0.4, 9.0, 3.0],
             [2.5, 2.5, 0.4, 0.25 / GAIN, 1.0],
             [2.5, 2.5, 0.4, 0.5 / GAIN, 2.0],
         ];
-        let key = draw(&mut layers, &parts);
-        assert!(layers.at(MIDDLE, 5).abs_diff_eq(Vec4::new(0.25, 0.25, 0.5, 1.0), 1e-6));
-        assert_eq!((key & 0xffff_ffff, (key >> 32) as u32), (1, 1f32.to_bits()), "the nearest");
+        let layers = draw(&parts, &COLORS, 3);
+        assert!(is(layers.at(SLOT), 0.25, 0.25, 0.5, 1.0));
+        assert_eq!(layers.at(SLOT).unwrap().first, 1, "the nearest");
         // Alone the front leaves the rest to the environment.
-        draw(&mut layers, &parts[1..2]);
-        assert!(layers.at(MIDDLE, 5).abs_diff_eq(Vec4::new(0.25, 0.0, 0.0, 0.25), 1e-6));
+        assert!(is(draw(&parts[1..2], &COLORS, 3).at(SLOT), 0.25, 0.0, 0.0, 0.25));
         // A full front hides all.
-        draw(&mut layers, &[[2.5, 2.5, 0.4, 2.0, 1.0], [2.5, 2.5, 0.4, 2.0, 2.0]]);
-        assert!(layers.at(MIDDLE, 5).abs_diff_eq(Vec4::new(1.0, 0.0, 0.0, 1.0), 1e-6));
+        let full = [[2.5, 2.5, 0.4, 2.0, 1.0], [2.5, 2.5, 0.4, 2.0, 2.0]];
+        assert!(is(draw(&full, &COLORS, 3).at(SLOT), 1.0, 0.0, 0.0, 1.0));
+        assert_eq!(draw(&[], &COLORS, 3).at(SLOT), None);
+    }
+
+    #[test]
+    fn mirrors_hide_what_is_behind_them_and_show_nothing() {
+        // The third is a mirror's: a quarter of the pixel, before, between and behind two objects.
+        let mut parts = [
+            [2.5, 2.5, 0.4, 0.5 / GAIN, 1.0],
+            [2.5, 2.5, 0.4, 9.0, 3.0],
+            [2.5, 2.5, 0.4, 0.25 / GAIN, 0.0],
+        ];
+        for (depth, second) in [(0.5, 0.25), (2.0, 0.25), (4.0, 0.5)] {
+            parts[2][4] = depth;
+            let layers = draw(&parts, &COLORS, 2);
+            assert!(is(layers.at(SLOT), 0.5, second, 0.0, 0.5 + second), "{depth}");
+            assert_eq!(layers.at(SLOT).unwrap().first, 0, "a mirror is no object");
+        }
+        parts[2][3] = 9.0;
+        parts[2][4] = 0.5;
+        assert_eq!(draw(&parts, &COLORS, 2).at(SLOT), None);
     }
 
     #[test]
     fn a_splat_covers_what_its_form_says_within_the_patch() {
         let (x, y, radius) = (2.2f32, 2.7f32, 1.9f32);
-        let mut layers = Layers::default();
-        let mut tile = tile();
-        layers.draw(&hits(&[[x, y, radius, 0.1, 1.0]]), &[Vec3::ONE], u32::MAX, 5, &mut tile);
+        let layers = draw(&[[x, y, radius, 0.1, 1.0]], &[Vec3::ONE], 1);
         for row in 0..5 {
             for column in 0..5 {
                 let slot = row * 5 + column;
@@ -345,23 +371,64 @@ mod tests {
                 let kernel = (1.0 - (dx * dx + dy * dy) / (radius * radius)).max(0.0).powi(2);
                 let own = (1..4).contains(&row) && (1..4).contains(&column);
                 let expected = if own { 0.1 * GAIN * kernel } else { 1.0 };
-                assert!((layers.sum[slot].w - expected).abs() < 1e-6, "{row} {column}");
+                assert!((layers.planes[FULL][slot] - expected).abs() < 1e-6, "{row} {column}");
             }
         }
     }
 
     #[test]
+    fn wide_splats_cover_all_their_columns() {
+        // Rows longer than a vector.
+        let mut layers = Layers::default();
+        let tile = vec![EMPTY; 3 * 40];
+        let hits = hits(&[[20.0, 1.5, 19.0, 0.1, 1.0]]);
+        dispatch!(simd_level(), simd => layers.draw(simd, &hits, &[Vec3::ONE], 1, 40, &tile));
+        for column in 0..40 {
+            let dx = column as f32 + 0.5 - 20.0;
+            let kernel = (1.0 - dx * dx / (19.0 * 19.0)).max(0.0).powi(2);
+            let found = layers.planes[FULL][40 + column];
+            assert!((found - 0.1 * GAIN * kernel).abs() < 1e-6, "{column}: {found}");
+        }
+    }
+
+    /// Layers whose pixels all show red at depth 1, but for the middle one: a part of that, and green behind.
+    fn gap(front: f32, behind: f32) -> Layers {
+        let mut layers = draw(&[[2.5, 2.5, 90.0, 9.0, 1.0]], &COLORS, 3);
+        let mut set = |plane: usize, value: f32| layers.planes[plane][SLOT] = value;
+        set(0, front);
+        set(1, behind);
+        set(FULL, front + behind);
+        set(SHOWN, front + behind);
+        set(FRONT, if behind > 0.0 { front } else { 2.0 });
+        layers
+    }
+
+    #[test]
     fn gaps_between_covered_pixels_are_closed_and_edges_stay() {
-        let mut layers = Layers { sum: vec![Vec4::W; 25], ..Layers::default() };
-        layers.sum[MIDDLE] = Vec4::new(0.3, 0.15, 0.0, 0.6);
-        assert!(layers.at(MIDDLE, 5).abs_diff_eq(Vec4::new(0.5, 0.25, 0.0, 1.0), 1e-6));
+        let mut layers = gap(0.6, 0.0);
+        assert!(is(layers.at(SLOT), 1.0, 0.0, 0.0, 1.0));
         // The right and lower neighbours are open: an edge.
-        layers.sum[MIDDLE + 1] = Vec4::ZERO;
-        layers.sum[MIDDLE + 5] = Vec4::ZERO;
-        assert_eq!(layers.at(MIDDLE, 5).w, 0.6);
+        layers.planes[FULL][SLOT + 1] = 0.0;
+        layers.planes[FULL][SLOT + 5] = 0.0;
+        assert!(is(layers.at(SLOT), 0.6, 0.0, 0.0, 0.6));
         // What is nearly open stays so.
-        layers.sum = vec![Vec4::W; 25];
-        layers.sum[MIDDLE] = Vec4::splat(0.1);
-        assert_eq!(layers.at(MIDDLE, 5).w, 0.1);
+        assert!(is(gap(0.1, 0.0).at(SLOT), 0.1, 0.0, 0.0, 0.1));
+    }
+
+    #[test]
+    fn what_is_behind_does_not_show_through_gaps_of_a_surface() {
+        assert!(is(gap(0.6, 0.4).at(SLOT), 1.0, 0.0, 0.0, 1.0));
+        // Its neighbours show something else, nearer or farther: it is an edge.
+        let mut layers = gap(0.6, 0.4);
+        for other in [SLOT - 1, SLOT - 5] {
+            layers.planes[NEAR][other] = 0.9;
+        }
+        assert!(is(layers.at(SLOT), 0.6, 0.4, 0.0, 1.0));
+        // Of the depths before and behind a splat, its range decides which are another surface.
+        let parts =
+            [[2.5, 2.5, 0.4, 0.3 / GAIN, 1.0], [2.5, 2.5, 0.4, 9.0, 1.4], [2.5, 2.5, 0.4, 9.0, 1.6]];
+        assert_eq!(draw(&parts[..2], &COLORS, 3).planes[FRONT][SLOT], 2.0);
+        let apart = [parts[0], parts[2]];
+        assert!((draw(&apart, &COLORS, 3).planes[FRONT][SLOT] - 0.3).abs() < 1e-6);
     }
 }

@@ -50,7 +50,7 @@ impl Packed {
             self.y.extend_from_slice(&surfels.y[range.clone()]);
             self.z.extend_from_slice(&surfels.z[range.clone()]);
             self.surfel.extend(first..first + count);
-            if first >= camera.representatives && camera.extent.is_finite() {
+            if first >= camera.representatives {
                 for extent in &surfels.extent[range] {
                     let share = camera.extent / extent;
                     self.size.push(share * share);
