@@ -33,7 +33,7 @@ pub struct FrameReport {
     pub valid: Option<u64>,
     /// Pixels whose centre shows a mirror.
     pub mirror_pixels: usize,
-    /// Those that reflect an object.
+    /// Those that objects cover at least half of.
     pub covered_pixels: usize,
     /// Mirror ids, depth and direct visibility.
     pub ids_ms: Option<f64>,
@@ -213,6 +213,11 @@ impl Renderer {
     /// What every mirror pixel of the last frame shows, if it was asked for.
     pub fn planes(&self) -> Option<&Planes> {
         self.reflection.planes.as_deref()
+    }
+
+    /// The share of each pixel that reflects objects.
+    pub fn coverage(&self) -> &[f32] {
+        &self.reflection.coverage
     }
 
     /// The reflection's radiance by pixel, before environment and tint; zero where nothing landed.

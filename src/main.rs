@@ -94,11 +94,18 @@ fn run(cli: &Cli, matches: &clap::ArgMatches, cx: &Context) -> anyhow::Result<()
 fn built_in_scene(cx: &Context) -> anyhow::Result<()> {
     let args = RenderArgs {
         scene: SceneArgs::default_scene(),
-        how: HowArgs { method: "c3rc".into(), backend: "auto".into(), preset: None, quality: "default".into() },
+        how: HowArgs {
+            method: "c3rc".into(),
+            backend: "auto".into(),
+            preset: None,
+            quality: "default".into(),
+        },
         output: "catoptric.png".into(),
         aov: None,
         json: None,
         repeat: 1,
+        frames: None,
+        orbit: 360.0,
     };
     say!("Rendering the built-in scene to a picture (this version has no viewer window).");
     commands::render::run(&args, &clap::ArgMatches::default(), cx)?;

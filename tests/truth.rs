@@ -104,12 +104,8 @@ fn compare(scene: &PreparedScene, ours: &Planes, reference: &Planes) -> Truth {
 }
 
 /// The paper's: a camera a triangle, every surfel, squares.
-const SQUARES: [(&str, &str); 4] = [
-    ("cameras", "triangles"),
-    ("splat", "square2"),
-    ("detail", "0"),
-    ("mirror-occlusion", "off"),
-];
+const SQUARES: [(&str, &str); 4] =
+    [("cameras", "triangles"), ("splat", "square2"), ("detail", "0"), ("mirror-occlusion", "off")];
 const REFERENCE: [(&str, &str); 2] = [("rays", "camera"), ("mirror-occlusion", "off")];
 
 fn truth(name: &str, request: &Request, surfels: usize) -> Truth {

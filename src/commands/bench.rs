@@ -51,8 +51,7 @@ const WARM_UP: u32 = 3;
 
 pub(crate) fn layer(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> anyhow::Result<()> {
     check_json(args.json.as_ref())?;
-    let (method, params, leaf) =
-        chosen_method(&args.how, matches)?;
+    let (method, params, leaf) = chosen_method(&args.how, matches)?;
     if method.info().id == "raytrace" {
         let problem = "raytrace is what the layer is compared with";
         return Err(Error::input("--method", "", problem, "choose another method").into());

@@ -171,16 +171,23 @@ impl SceneArgs {
             seed: self.seed,
         };
         let scene = PreparedScene::new(&scene, &options, cx)?;
-        let eye = eye_of(&scene, self.size)?;
+        let eye = seen(scene.eye_for(self.size), "--eye, --target, --fov")?;
         Ok(Ready { scene, eye, load_ms })
     }
 }
 
-/// The scene's own eye for a picture size.
-fn eye_of(scene: &PreparedScene, size: ImageSize) -> Result<Eye> {
-    scene.eye_for(size).ok_or_else(|| {
+impl Ready {
+    /// The eye, moved around its target.
+    pub(crate) fn orbited(&self, radians: f64) -> Result<Eye> {
+        let eye = self.scene.eye.orbited(radians);
+        seen(self.scene.eye_of(&eye, self.eye.size), "--orbit")
+    }
+}
+
+fn seen(eye: Option<Eye>, options: &str) -> Result<Eye> {
+    eye.ok_or_else(|| {
         Error::input(
-            "--eye, --target, --fov",
+            options,
             "",
             "they do not make a view",
             "let the eye differ from the target, not look along its up vector, and take 0 < fov < 180",

@@ -1,5 +1,6 @@
 //! `catoptric render`: a scene to a picture.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use catoptric::Context;
@@ -7,6 +8,7 @@ use catoptric::frame::{FrameReport, Renderer};
 use catoptric::geometry::lanes::simd_level;
 use catoptric::image::aov::{self, write_aov};
 use catoptric::image::io::{check_output, write_picture};
+use catoptric::image::temporal::{Restlessness, Sequence};
 use clap::{ArgMatches, Args};
 use serde_json::{Value, json};
 
@@ -32,6 +34,19 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(crate) repeat: u32,
+    /// Draw frames of an orbit about the target, --output with a number each, and report how restless they are
+    #[arg(long, value_name = "N", conflicts_with_all = ["repeat", "aov"], allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) frames: Option<u32>,
+    /// How far the eye moves in these frames, to the right, in degrees (a whole turn ends one frame before it began)
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 360.0,
+        requires = "frames",
+        allow_hyphen_values = true
+    )]
+    pub(crate) orbit: f64,
 }
 
 /// Method and backend.
@@ -63,24 +78,43 @@ pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyh
         ("--aov", args.aov.as_deref()),
         ("--json", args.json.as_deref()),
     ])?;
-    let (method, params, leaf) =
-        chosen_method(&args.how, matches)?;
+    let (method, params, leaf) = chosen_method(&args.how, matches)?;
     let ready = args.scene.ready(leaf, cx)?;
     let mut renderer = Renderer::new();
     if !args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         renderer.keep_bright();
     }
     let mut reports = Vec::new();
-    for i in 0..args.repeat {
-        if args.repeat > 1 {
-            cx.step("rendering", f64::from(i) / f64::from(args.repeat))?;
+    let mut sequence = Sequence::default();
+    let turn = args.orbit.to_radians();
+    let count = args.frames.unwrap_or(args.repeat);
+    for i in 0..count {
+        let share = f64::from(i) / f64::from(count);
+        if count > 1 {
+            cx.step("rendering", share)?;
         }
         // The planes come with the last frame, and cost the timed ones nothing.
-        let planes = args.aov.is_some() && i + 1 == args.repeat;
-        reports.push(renderer.render(&ready.scene, &ready.eye, method, &params, planes, cx)?);
+        let planes = args.aov.is_some() && i + 1 == count;
+        let eye = match args.frames {
+            Some(_) => ready.orbited(turn * share)?,
+            None => ready.eye,
+        };
+        reports.push(renderer.render(&ready.scene, &eye, method, &params, planes, cx)?);
+        if args.frames.is_some() {
+            write_picture(&numbered(&args.output, i), renderer.picture())?;
+            let on = renderer.coverage().iter().map(|&c| c >= 0.5).collect();
+            sequence.add(&renderer.picture().rgb, on);
+        }
     }
     let report = FrameReport::median(&reports);
     cx.step("writing", 1.0)?;
+    if let Some(frames) = args.frames {
+        let figures = orbit_figures(&ready, &report, frames, args.orbit, sequence.figures());
+        write_json(args.json.as_ref(), &figures)?;
+        print(&numbered(&args.output, frames - 1), &ready, &report);
+        print_orbit(frames, args.orbit, sequence.figures());
+        return Ok(());
+    }
     write_picture(&args.output, renderer.picture())?;
     if let (Some(path), Some(planes)) = (&args.aov, renderer.planes()) {
         let names: Vec<String> = ready.scene.objects.iter().map(|o| o.name.clone()).collect();
@@ -89,6 +123,41 @@ pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyh
     write_json(args.json.as_ref(), &figures(&ready, &report))?;
     print(&args.output, &ready, &report);
     Ok(())
+}
+
+/// `picture.png` as `picture-0007.png`.
+fn numbered(path: &Path, frame: u32) -> PathBuf {
+    let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    let name = format!("{}-{frame:04}.{}", text(path.file_stem()), text(path.extension()));
+    path.with_file_name(name)
+}
+
+fn orbit_figures(
+    ready: &Ready,
+    report: &FrameReport,
+    frames: u32,
+    degrees: f64,
+    found: Restlessness,
+) -> Value {
+    let mut value = figures(ready, report);
+    value["orbit"] = json!({
+        "frames": frames,
+        "degrees": degrees,
+        "second_difference": found.second_difference,
+        "rms_median": found.rms_median,
+        "rms_max": found.rms_max,
+    });
+    value
+}
+
+fn print_orbit(frames: u32, degrees: f64, found: Restlessness) {
+    let Restlessness { second_difference, rms_median, rms_max } = found;
+    if let (Some(second), Some(median), Some(max)) = (second_difference, rms_median, rms_max) {
+        say!(
+            "  {frames} frames over {degrees} degrees (times are medians); second difference {second:.5}, \
+             change from frame to frame {median:.5} (largest {max:.5}), linear RGB where objects are reflected"
+        );
+    }
 }
 
 /// The keys that the README documents. A stage that was not timed apart is null, and so is what the method has

@@ -9,6 +9,7 @@ pub mod flip;
 pub mod io;
 pub mod picture;
 pub mod planes;
+pub mod temporal;
 
 pub use picture::Picture;
 pub use planes::{NONE, Planes, Reason};

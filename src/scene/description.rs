@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 
 use crate::geometry::{Mesh, Similarity};
 
@@ -34,6 +34,15 @@ pub struct EyeDescription {
     pub up: DVec3,
     /// Vertical field of view in radians, more than 0 and less than π.
     pub fov_y: f64,
+}
+
+impl EyeDescription {
+    /// Moved around its target about `up`, counterclockwise seen from above. `radians`: how far.
+    pub fn orbited(&self, radians: f64) -> Self {
+        let axis = self.up.try_normalize().unwrap_or(DVec3::Y);
+        let turn = DQuat::from_axis_angle(axis, radians);
+        Self { position: self.target + turn * (self.position - self.target), ..*self }
+    }
 }
 
 /// A perfectly specular mesh with smooth normals.

@@ -287,7 +287,8 @@ impl PreparedScene {
         for (i, object) in scene.objects.iter().enumerate() {
             prepared.place(i, &object.transform);
         }
-        for (cloud, mirror) in prepared.clouds[scene.objects.len()..].iter_mut().zip(&scene.mirrors) {
+        for (cloud, mirror) in prepared.clouds[scene.objects.len()..].iter_mut().zip(&scene.mirrors)
+        {
             cloud.place(from_origin(&mirror.transform, origin));
         }
         prepared.average();
@@ -297,7 +298,12 @@ impl PreparedScene {
     /// The scene's own eye for a picture of this size; `None` if its description makes no view (see
     /// [`Eye::new`]).
     pub fn eye_for(&self, size: ImageSize) -> Option<Eye> {
-        let EyeDescription { position, target, up, fov_y } = self.eye;
+        self.eye_of(&self.eye, size)
+    }
+
+    /// Another eye; `None` if its description makes no view (see [`Eye::new`]).
+    pub fn eye_of(&self, eye: &EyeDescription, size: ImageSize) -> Option<Eye> {
+        let EyeDescription { position, target, up, fov_y } = *eye;
         Eye::new(position - self.origin, target - self.origin, up, fov_y, size)
     }
 
@@ -431,9 +437,8 @@ pub(super) fn sample_mirrors(
         scene.mirrors.iter().map(|m| m.mesh.area() * m.transform.scale.powi(2)).collect();
     let counts = sample::allot(&areas, &[], most.min(MIRROR_SURFELS));
     let paint = Paint::Constant(Vec3::ZERO);
-    let of = |(mirror, count): (&Mirror, usize)| {
-        sample::sample(&mirror.mesh, &paint, count, seed, cx)
-    };
+    let of =
+        |(mirror, count): (&Mirror, usize)| sample::sample(&mirror.mesh, &paint, count, seed, cx);
     scene.mirrors.iter().zip(counts).map(of).collect()
 }
 

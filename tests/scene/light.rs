@@ -6,7 +6,8 @@ use catoptric::scene::description::Scene;
 use glam::DVec3;
 
 use super::{
-    BLUE, GREY, RED, looks, moved, near, object, prepared, rendered, rendered_with, scene, shape, turned,
+    BLUE, GREY, RED, looks, moved, near, object, prepared, rendered, rendered_with, scene, shape,
+    turned,
 };
 
 const SIZE: [u32; 2] = [960, 540];

@@ -78,23 +78,21 @@ static INFO: MethodInfo = MethodInfo {
             is_quality_knob: false,
         },
     ],
-    presets: &[
-        Preset {
-            id: "paper",
-            about: "as Mei et al.: unit rays, their box test, leaves of 122, 1-pixel squares, first root, push-back depth",
-            params: &[
-                ("cameras", "triangles"),
-                ("test", "paper"),
-                ("splat", "square1"),
-                ("detail", "0"),
-                ("depth", "push-back"),
-                ("ray-scale", "unit"),
-                ("roots", "first"),
-                ("mirror-occlusion", "off"),
-            ],
-            leaf_points: Some(122),
-        },
-    ],
+    presets: &[Preset {
+        id: "paper",
+        about: "as Mei et al.: unit rays, their box test, leaves of 122, 1-pixel squares, first root, push-back depth",
+        params: &[
+            ("cameras", "triangles"),
+            ("test", "paper"),
+            ("splat", "square1"),
+            ("detail", "0"),
+            ("depth", "push-back"),
+            ("ray-scale", "unit"),
+            ("roots", "first"),
+            ("mirror-occlusion", "off"),
+        ],
+        leaf_points: Some(122),
+    }],
     qualities: &[
         Preset {
             id: "draft",

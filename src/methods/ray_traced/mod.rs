@@ -41,7 +41,12 @@ static INFO: MethodInfo = MethodInfo {
     presets: &[],
     qualities: &[
         Preset { id: "draft", about: "1 ray a pixel", params: &[("spp", "1")], leaf_points: None },
-        Preset { id: "best", about: "16 rays a pixel", params: &[("spp", "16")], leaf_points: None },
+        Preset {
+            id: "best",
+            about: "16 rays a pixel",
+            params: &[("spp", "16")],
+            leaf_points: None,
+        },
     ],
 };
 

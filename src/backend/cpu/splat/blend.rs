@@ -161,8 +161,7 @@ impl Layers {
                     reason = "see above"
                 )]
                 let at = index * self.stride + column as usize;
-                let row =
-                    Row { dx: column + 0.5 - x, slope, rest, at, count: end - column + 1.0 };
+                let row = Row { dx: column + 0.5 - x, slope, rest, at, count: end - column + 1.0 };
                 self.row(simd, hits, i, a, &row, color, shows);
             }
             row += 1.0;
@@ -248,8 +247,7 @@ impl Layers {
         )]
         let first = get(FIRST, slot) as usize;
         let found = |value: Vec4| (value.w > 0.0).then_some(Blended { value, first });
-        let beside =
-            [(slot - 1, slot + 1), (slot - self.stride, slot + self.stride)];
+        let beside = [(slot - 1, slot + 1), (slot - self.stride, slot + self.stride)];
         let full = get(FULL, slot);
         let mut own = own;
         if (CLOSING..WHOLE).contains(&full) {
@@ -425,8 +423,11 @@ mod tests {
         }
         assert!(is(layers.at(SLOT), 0.6, 0.4, 0.0, 1.0));
         // Of the depths before and behind a splat, its range decides which are another surface.
-        let parts =
-            [[2.5, 2.5, 0.4, 0.3 / GAIN, 1.0], [2.5, 2.5, 0.4, 9.0, 1.4], [2.5, 2.5, 0.4, 9.0, 1.6]];
+        let parts = [
+            [2.5, 2.5, 0.4, 0.3 / GAIN, 1.0],
+            [2.5, 2.5, 0.4, 9.0, 1.4],
+            [2.5, 2.5, 0.4, 9.0, 1.6],
+        ];
         assert_eq!(draw(&parts[..2], &COLORS, 3).planes[FRONT][SLOT], 2.0);
         let apart = [parts[0], parts[2]];
         assert!((draw(&apart, &COLORS, 3).planes[FRONT][SLOT] - 0.3).abs() < 1e-6);
