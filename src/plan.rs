@@ -119,7 +119,7 @@ impl SplatShape {
 /// Surfels are so evenly spread that a disk of this many of their radii about any point of a surface holds one.
 pub const EVENNESS: f32 = 1.5;
 /// The camera of a cell of the picture may be about so many pixels beside its exact rays; see [`Pixels::deviations`].
-pub const CELL_SLACK_PX: f32 = 1.0;
+pub const CELL_SLACK_PX: f32 = 0.5;
 
 /// What decides which surfel is nearest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
