@@ -114,7 +114,7 @@ impl Walk<'_> {
             if let Some(gaze) = &self.gaze {
                 bits &= !turned_away(simd, node, gaze);
             }
-            let small = if self.per_pixel > 0.0 { self.small(simd, node, &tested) } else { [0; 3] };
+            let small = if self.per_pixel > 0.0 { self.small(simd, node, &tested) } else { [0; 4] };
             // The last child first, so that leaves come out in surfel order.
             while bits != 0 {
                 let slot = 63 - bits.leading_zeros();
@@ -160,7 +160,7 @@ impl Walk<'_> {
     /// What is left to do for a child of the wide node `at`: its surfels, its representative, that of a few of its
     /// parts, or its own children.
     #[inline(always)]
-    fn open(&self, node: &WideNode, at: u32, slot: u32, small: [u64; 3], tested: &Tested) -> Open {
+    fn open(&self, node: &WideNode, at: u32, slot: u32, small: [u64; 4], tested: &Tested) -> Open {
         let i = slot as usize;
         let child = node.child[i];
         let all = Open {
@@ -184,6 +184,12 @@ impl Walk<'_> {
                     Open { child: 0, first: parts + offset, count, ..all }
                 }
             }
+        } else if small[3] >> slot & 1 != 0 {
+            // Its children's are projected untested: that costs less than the tests.
+            match child {
+                0 => Open { child: 0, ..all },
+                _ => Open { child: 0, first: parts, count: self.used(child), ..all },
+            }
         } else if tested.inside >> slot & 1 != 0 && self.per_pixel == 0.0 {
             Open { child: 0, ..all }
         } else {
@@ -197,9 +203,9 @@ impl Walk<'_> {
         self.wide[wide as usize].used.count_ones()
     }
 
-    /// Bit i: child i is seen as small enough for one, two, four representatives.
+    /// Bit i: child i is seen as small enough for one, two, four, eight representatives.
     #[inline(always)]
-    fn small<S: Simd>(&self, simd: S, node: &WideNode, tested: &Tested) -> [u64; 3] {
+    fn small<S: Simd>(&self, simd: S, node: &WideNode, tested: &Tested) -> [u64; 4] {
         type V<S> = f32x8<S>;
         let lambda = (V::load(simd, &tested.lo) + V::load(simd, &tested.hi)) * 0.5;
         let [a, b, c] = self.footprint;
@@ -222,6 +228,7 @@ impl Walk<'_> {
             V::<S>::bits(needed.le(seen) & real),
             V::<S>::bits(needed.le(seen * 2.0) & real),
             V::<S>::bits(needed.le(seen * 4.0) & real),
+            V::<S>::bits(needed.le(seen * 6.0) & real),
         ]
     }
 }

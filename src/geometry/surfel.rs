@@ -20,7 +20,7 @@ pub struct Surfels {
     pub albedo: Vec<Vec3>,
     /// Linear RGB radiance as shaded; not in 0 to 1 in general.
     pub radiance: Vec<Vec3>,
-    /// Radius of the disk that the surfel stands for, local units.
+    /// Radius of the disk that the surfel stands for, local units. [`PADDING`] elements more in a prepared scene.
     pub extent: Vec<f32>,
 }
 

@@ -501,7 +501,7 @@ fn append(all: &mut Surfels, own: Surfels) {
 }
 
 fn pad(surfels: &mut Surfels) {
-    for list in [&mut surfels.x, &mut surfels.y, &mut surfels.z] {
+    for list in [&mut surfels.x, &mut surfels.y, &mut surfels.z, &mut surfels.extent] {
         let last = list.last().copied().unwrap_or(0.0);
         list.extend([last; PADDING]);
     }

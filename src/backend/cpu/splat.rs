@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use self::blend::{Blended, Layers};
 use self::hits::Hits;
-use self::packed::Packed;
+use self::packed::{Packed, Rest};
 pub(crate) use self::projection::Projection;
 use super::pool::Pool;
 use crate::geometry::Surfels;
@@ -259,20 +259,11 @@ impl Shared<'_> {
     ) -> SplatCounters {
         let mut counters = SplatCounters::default();
         let mut last = Instant::now();
-        let mut batches = batches.iter();
-        let (mut batch, mut from) = (batches.next(), 0);
-        while batch.is_some() {
-            packed.clear();
-            while let Some(open) = batch
-                && packed.len() < CHUNK
-            {
-                from += packed.add(self.work.surfels, self.work.camera, open, from);
-                if from == open.count {
-                    (batch, from) = (batches.next(), 0);
-                }
-            }
+        let mut rest = Rest { batches, done: 0 };
+        while !rest.batches.is_empty() {
+            let Projection { surfels, camera, .. } = self.work;
+            dispatch!(self.level, simd => packed.fill(simd, surfels, camera, &mut rest));
             let count = packed.len();
-            packed.pad();
             if self.work.pass.shape != SplatShape::Ellipse {
                 hits.len = 0;
             }

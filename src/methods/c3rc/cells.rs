@@ -5,7 +5,7 @@
 mod field;
 mod fit;
 
-use fearless_simd::dispatch;
+use fearless_simd::{Simd, dispatch};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -69,7 +69,7 @@ pub(super) fn cells(
             |(mut field, mut groups, mut cells), i| {
                 let origin = [i % across * tile, i / across * tile];
                 groups.clear();
-                dispatch!(top.level, _simd => of_tile(frame, &top, origin, &mut field, settings, &mut groups));
+                dispatch!(top.level, simd => of_tile(simd, frame, &top, origin, &mut field, settings, &mut groups));
                 for group in &groups {
                     cells.push(frame, &top, origin, &field, group, settings);
                 }
@@ -145,7 +145,8 @@ fn sees_nothing(
 
 /// Groups the pixels of a tile: from a seed's tangent grows what one linear function describes.
 #[inline(always)]
-fn of_tile(
+fn of_tile<S: Simd>(
+    simd: S,
     frame: FrameInput<'_>,
     top: &Top,
     origin: [u32; 2],
@@ -170,14 +171,14 @@ fn of_tile(
         let growing = GROWING * CELL_SLACK_PX;
         let mut linear = tangent;
         let mut near = Judge::new(&tangent, center, focal_px, growing, SURFACE_TOLERANCE_PX)
-            .accepted(&field.field, &left);
+            .accepted(simd, &field.field, &left);
         for round in 0..ROUNDS {
             let sums = Sums::new(&field.field, about, &near);
             let Some(better) = sums.fit(about) else { break };
             let tolerance = if round + 1 < ROUNDS { growing } else { CELL_SLACK_PX };
             let judge =
                 Judge::new(&better, sums.middle(), focal_px, tolerance, SURFACE_TOLERANCE_PX);
-            let grown = judge.accepted(&field.field, &left);
+            let grown = judge.accepted(simd, &field.field, &left);
             let same = grown == near;
             (linear, near) = (better, grown);
             if same || near == left {
@@ -187,7 +188,7 @@ fn of_tile(
         if near[seed[1]] >> seed[0] & 1 == 0 {
             linear = tangent;
             near = Judge::new(&tangent, center, focal_px, CELL_SLACK_PX, SURFACE_TOLERANCE_PX)
-                .accepted(&field.field, &left);
+                .accepted(simd, &field.field, &left);
             near[seed[1]] |= 1 << seed[0];
         }
         for y in 0..TILE {
@@ -195,7 +196,7 @@ fn of_tile(
         }
         let judge =
             Judge::new(&linear, center, focal_px, NEIGHBOURS * CELL_SLACK_PX, SURFACE_TOLERANCE_PX);
-        let known = judge.accepted(&field.field, &shown);
+        let known = judge.accepted(simd, &field.field, &shown);
         out.push(Group { rows: near, known, linear });
     }
 }

@@ -134,17 +134,12 @@ impl Layers {
         let e = &hits.ellipse;
         let (x, y) = (e[MIDDLE][i], e[MIDDLE + 1][i]);
         let (a, b, c) = (e[FORM][i], e[FORM + 1][i], e[FORM + 2][i]);
-        let high = e[HALF + 1][i];
+        let (wide, high) = (e[HALF][i], e[HALF + 1][i]);
         let inverse = 1.0 / a;
         // Centres of pixels lie half a pixel behind their index. Not negative: casts truncate, which is floor.
         let mut row = (y - high - 0.5).ceil().max(0.0);
         let last = (y + high - 0.5).min(self.spans.len() as f32 - 1.0);
         while row <= last {
-            let dy = row + 0.5 - y;
-            let (slope, rest) = (2.0 * b * dy, c * dy * dy);
-            // Between the roots of 1 = a dx² + slope dx + rest.
-            let middle = -0.5 * slope * inverse;
-            let half = ((1.0 - rest) * inverse + middle * middle).max(0.0).sqrt();
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -152,6 +147,15 @@ impl Layers {
             )]
             let index = row as usize;
             let [left, right] = self.spans[index];
+            let dy = row + 0.5 - y;
+            row += 1.0;
+            if x + wide < left || right + 1.0 < x - wide {
+                continue;
+            }
+            let (slope, rest) = (2.0 * b * dy, c * dy * dy);
+            // Between the roots of 1 = a dx² + slope dx + rest.
+            let middle = -0.5 * slope * inverse;
+            let half = ((1.0 - rest) * inverse + middle * middle).max(0.0).sqrt();
             let column = (x + middle - half - 0.5).ceil().max(left);
             let end = (x + middle + half - 0.5).min(right);
             if column <= end {
@@ -164,7 +168,6 @@ impl Layers {
                 let row = Row { dx: column + 0.5 - x, slope, rest, at, count: end - column + 1.0 };
                 self.row(simd, hits, i, a, &row, color, shows);
             }
-            row += 1.0;
         }
     }
 

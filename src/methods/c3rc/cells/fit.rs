@@ -2,10 +2,12 @@
 
 #![expect(clippy::needless_range_loop, reason = "compilers see through indices best")]
 
+use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
 
 use super::TILE;
 use super::field::{AREA, Linear, centre};
+use crate::geometry::lanes::{Real, Vector};
 
 /// Sums over pixels from which the best linear function follows. They can be added.
 #[derive(Clone, Copy, Debug, Default)]
@@ -181,18 +183,23 @@ impl Judge {
 
     /// Those pixels of `mask` whose rays are near enough.
     #[inline(always)]
-    pub(super) fn accepted(&self, field: &[[f32; AREA]; 4], mask: &Mask) -> Mask {
+    pub(super) fn accepted<S: Simd>(&self, simd: S, field: &[[f32; AREA]; 4], mask: &Mask) -> Mask {
+        let limit: f32x16<S> = Vector::broadcast(simd, self.accepted);
         let mut near = *mask;
         for y in 0..TILE {
             if near[y] == 0 {
                 continue;
             }
             let far = self.row(field, y);
-            let mut bits = 0u32;
-            for i in 0..TILE {
-                bits |= u32::from(far[i] <= self.accepted) << i;
+            // Compilers do not see that the comparisons make a word.
+            let mut word = 0u64;
+            for (half, far) in far.chunks_exact(16).enumerate() {
+                let far: f32x16<S> = Vector::load(simd, far);
+                word |= f32x16::<S>::bits(far.le(limit)) << (16 * half);
             }
-            near[y] &= bits;
+            #[expect(clippy::cast_possible_truncation, reason = "a bit a column")]
+            let word = word as u32;
+            near[y] &= word;
         }
         near
     }
