@@ -1,8 +1,7 @@
 //! Triangle meshes that were checked once and are trusted afterwards.
 
-use std::collections::HashMap;
-
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::Aabb;
 
@@ -154,17 +153,23 @@ impl Mesh {
     /// Whether the triangles enclose a volume and the normals point out of it: every edge has one triangle on each
     /// side. Vertices at one place count as one.
     pub fn is_closed_outward(&self) -> bool {
-        let mut names = HashMap::with_capacity(self.positions.len());
-        let name: Vec<u32> = self
+        // Vertices at one place have one name: the first of them.
+        let mut places: Vec<([u32; 3], u32)> = self
             .positions
-            .iter()
-            .map(|p| {
-                // -0 is 0.
-                let key = p.to_array().map(|x| (x + 0.0).to_bits());
-                let next = names.len();
-                *names.entry(key).or_insert_with(|| u32::try_from(next).unwrap_or(u32::MAX))
+            .par_iter()
+            .enumerate()
+            // -0 is 0.
+            .map(|(i, p)| {
+                (p.to_array().map(|x| (x + 0.0).to_bits()), u32::try_from(i).unwrap_or(u32::MAX))
             })
             .collect();
+        places.par_sort_unstable();
+        let mut name = vec![0; places.len()];
+        for same in places.chunk_by(|a, b| a.0 == b.0) {
+            for (_, i) in same {
+                name[*i as usize] = same[0].1;
+            }
+        }
         let mut edges = Vec::with_capacity(3 * self.triangles.len());
         let (mut volume, mut outward) = (0.0, 0.0);
         let middle = self.bounds().center().as_dvec3();
@@ -182,7 +187,7 @@ impl Mesh {
             let normal: Vec3 = triangle.iter().map(|&i| self.normals[i as usize]).sum();
             outward += normal.as_dvec3().dot(face).signum() * face.length();
         }
-        edges.sort_unstable();
+        edges.par_sort_unstable();
         let pairs = edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
         let area = 2.0 * self.area();
         volume > 0.0 && outward > MOSTLY * area && edges.len().is_multiple_of(2) && { pairs }

@@ -216,9 +216,9 @@ impl PreparedScene {
         let start = Instant::now();
         let mut sampled = sample_objects(scene, options, cx)?;
         sampled.extend(sample_mirrors(scene, options.surfels, options.seed, cx)?);
-        let sample_ms = milliseconds(start);
         let mut prepared = Self::of_sampled(scene, sampled, options.tree, cx)?;
-        prepared.times.sample_ms = sample_ms;
+        // What is found out about the meshes, too.
+        prepared.times.sample_ms = milliseconds(start) - prepared.times.tree_ms;
         let start = Instant::now();
         prepared.shade(cx)?;
         prepared.times.shade_ms = milliseconds(start);
@@ -236,7 +236,6 @@ impl PreparedScene {
         limits: KdTreeLimits,
         cx: &Context,
     ) -> Result<Self> {
-        let start = Instant::now();
         let mut surfels = Surfels::default();
         let mut objects = Vec::with_capacity(sampled.len());
         let origin = mirror_center(scene);
@@ -254,11 +253,13 @@ impl PreparedScene {
         }
         let meshes = scene.objects.iter().map(|o| &o.mesh);
         let meshes = meshes.chain(scene.mirrors.iter().map(|m| &m.mesh));
+        let closed: Vec<bool> = meshes.map(|mesh| mesh.is_closed_outward()).collect();
+        let start = Instant::now();
         let count = sampled.len();
         let mut clouds: Vec<Cloud> = Vec::with_capacity(count);
-        for (mesh, own) in meshes.zip(sampled) {
+        for (closed, own) in closed.into_iter().zip(sampled) {
             cx.step("building trees", clouds.len() as f64 / count as f64)?;
-            clouds.push(Cloud::new(own, mesh.is_closed_outward(), limits, &mut surfels));
+            clouds.push(Cloud::new(own, closed, limits, &mut surfels));
         }
         pad(&mut surfels);
         let times = PrepareTimes { tree_ms: milliseconds(start), ..PrepareTimes::default() };
@@ -424,7 +425,7 @@ fn sample_objects(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Resu
 }
 
 /// Surfels of all mirrors together, at most.
-const MIRROR_SURFELS: usize = 1 << 17;
+const MIRROR_SURFELS: usize = 1 << 16;
 
 /// The mirrors' surfels: not more than `most` or so.
 pub(super) fn sample_mirrors(
