@@ -102,7 +102,8 @@ fn sparse(shown: &Mask) -> Mask {
 
 /// Whether a tile sees no object, by some of its rays and all of its depths.
 #[inline(always)]
-fn sees_nothing(
+fn sees_nothing<S: Simd>(
+    simd: S,
     frame: FrameInput<'_>,
     top: &Top,
     origin: [u32; 2],
@@ -130,7 +131,7 @@ fn sees_nothing(
         let from = (first + y) * eye.size.width as usize + left;
         row[..columns].copy_from_slice(&visibility.mirror_depth[from..from + columns]);
     }
-    if !judge.accepts_depths(&depth, shown) {
+    if !judge.accepts_depths(simd, &depth, shown) {
         return false;
     }
     let group = Group { rows: *shown, known: *shown, linear };
@@ -154,11 +155,11 @@ fn of_tile<S: Simd>(
     settings: CameraSettings,
     out: &mut Vec<Group>,
 ) {
-    let shown = field.enter(frame.eye, frame.visibility, origin);
+    let shown = field.enter(simd, frame.eye, frame.visibility, origin);
     if shown == [0; TILE] {
         return;
     }
-    if sees_nothing(frame, top, origin, field, &shown, settings) {
+    if sees_nothing(simd, frame, top, origin, field, &shown, settings) {
         return;
     }
     field.fill(frame.eye, frame.scene, &shown);

@@ -2,6 +2,7 @@
 
 #![expect(clippy::needless_range_loop, reason = "compilers see through indices best")]
 
+use fearless_simd::{Simd, SimdBase, SimdMask, u32x16};
 use glam::{DVec3, Vec3};
 
 use super::{TILE, TILE_PX};
@@ -75,8 +76,9 @@ impl RayField {
 
     /// Goes to the tile whose first pixel is (`left`, `top`); returns by row which pixels show a mirror.
     #[inline(always)]
-    pub(super) fn enter(
+    pub(super) fn enter<S: Simd>(
         &mut self,
+        simd: S,
         eye: &Eye,
         visibility: &Visibility,
         [left, top]: [u32; 2],
@@ -90,8 +92,12 @@ impl RayField {
             let from = (top as usize + y) * size.width as usize + left as usize;
             let ids = &visibility.mirror_ids[from..from + columns];
             self.ids[y * TILE..y * TILE + columns].copy_from_slice(ids);
-            for (x, &id) in ids.iter().enumerate() {
-                *shown |= u32::from(id != NONE_ID) << x;
+            for half in 0..2 {
+                let ids = &self.ids[y * TILE + 16 * half..][..16];
+                let none = u32x16::from_slice(simd, ids).simd_eq(NONE_ID);
+                #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+                let some = !none.to_bitmask() as u32 & 0xffff;
+                *shown |= some << (16 * half);
             }
         }
         if shown == [0; TILE] {

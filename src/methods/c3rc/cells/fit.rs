@@ -153,6 +153,20 @@ const AHEAD: f32 = 0.75;
 /// direction counts no more than this share says.
 const FLATTEST: f32 = 3e-4;
 
+/// Bit i: value i is at most `limit`. Compilers do not see that comparisons make a word.
+#[inline(always)]
+fn at_most<S: Simd>(simd: S, values: &[f32; TILE], limit: f32) -> u32 {
+    let limit: f32x16<S> = Vector::broadcast(simd, limit);
+    let mut word = 0u64;
+    for (half, values) in values.chunks_exact(16).enumerate() {
+        let values: f32x16<S> = Vector::load(simd, values);
+        word |= f32x16::<S>::bits(values.le(limit)) << (16 * half);
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "a bit a column")]
+    let word = word as u32;
+    word
+}
+
 impl Judge {
     /// About a position in the tile. `focal_px`: of the eye. `tolerance`: in pixels; `surface_tolerance`: the same for
     /// the mirror's points.
@@ -184,22 +198,13 @@ impl Judge {
     /// Those pixels of `mask` whose rays are near enough.
     #[inline(always)]
     pub(super) fn accepted<S: Simd>(&self, simd: S, field: &[[f32; AREA]; 4], mask: &Mask) -> Mask {
-        let limit: f32x16<S> = Vector::broadcast(simd, self.accepted);
         let mut near = *mask;
         for y in 0..TILE {
             if near[y] == 0 {
                 continue;
             }
             let far = self.row(field, y);
-            // Compilers do not see that the comparisons make a word.
-            let mut word = 0u64;
-            for (half, far) in far.chunks_exact(16).enumerate() {
-                let far: f32x16<S> = Vector::load(simd, far);
-                word |= f32x16::<S>::bits(far.le(limit)) << (16 * half);
-            }
-            #[expect(clippy::cast_possible_truncation, reason = "a bit a column")]
-            let word = word as u32;
-            near[y] &= word;
+            near[y] &= at_most(simd, &far, self.accepted);
         }
         near
     }
@@ -248,16 +253,20 @@ impl Judge {
     /// Whether the mirror's points at all pixels of `mask` are near enough. `depth`: of the tile's rows, along the eye's
     /// `forward`.
     #[inline(always)]
-    pub(super) fn accepts_depths(&self, depth: &[[f32; TILE]; TILE], mask: &Mask) -> bool {
+    pub(super) fn accepts_depths<S: Simd>(
+        &self,
+        simd: S,
+        depth: &[[f32; TILE]; TILE],
+        mask: &Mask,
+    ) -> bool {
         let l = &self.linear;
         for y in 0..TILE {
             let cy = centre(y);
-            let mut far = 0u32;
+            let mut apart = [0.0f32; TILE];
             for i in 0..TILE {
-                let apart = (depth[y][i] * l.get(3, centre(i), cy) - 1.0).abs();
-                far |= u32::from(apart > self.depth) << i;
+                apart[i] = (depth[y][i] * l.get(3, centre(i), cy) - 1.0).abs();
             }
-            if far & mask[y] != 0 {
+            if mask[y] & !at_most(simd, &apart, self.depth) != 0 {
                 return false;
             }
         }
