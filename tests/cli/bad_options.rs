@@ -50,6 +50,8 @@ fn options_of_every_command_that_prepares_a_scene() {
 fn options_of_methods() {
     let folder = Folder::new();
     for (options, expected) in [
+        ("--quality good", "--quality"),
+        ("--quality best --preset paper", "--preset"),
         ("--method magic", "--method: there is no method \"magic\"; use one of c3rc, raytrace"),
         ("--preset magic", "--preset: c3rc has no preset \"magic\"; use paper"),
         (
@@ -183,4 +185,20 @@ fn the_layer_of_rays_against_rays() {
     let folder = Folder::new();
     let expected = "--method: raytrace is what the layer is compared with; choose another method";
     folder.refused(&format!("bench layer {SMALL} --method raytrace"), &[expected]);
+}
+
+#[test]
+fn orbits() {
+    let folder = Folder::new();
+    for (options, expected) in [
+        ("--frames 0", "--frames"),
+        ("--frames -3", "--frames"),
+        ("--orbit 10", "--frames"),
+        ("--frames 3 --orbit nan", "--orbit: they do not make a view; "),
+        ("--frames 3 --orbit round", "--orbit"),
+        ("--frames 3 --repeat 3", "--repeat"),
+        ("--frames 3 --aov a.exr", "--aov"),
+    ] {
+        folder.refused(&format!("render {SMALL} {options} -o a.png"), &[expected]);
+    }
 }

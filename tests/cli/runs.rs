@@ -308,10 +308,10 @@ fn help_names_every_option() {
     let folder = Folder::new();
     let scene = "--mirror --object --surfels --leaf --leaf-size --seed --eye --target --fov --size --threads";
     let how = "--method --backend --preset --repeat --test --splat --depth --ray-scale --roots --rays --spp \
-               --mirror-occlusion";
+               --mirror-occlusion --quality --cameras --detail";
     for (command, options) in [
         ("", "render compare info bench --version".to_owned()),
-        ("render", format!("{scene} {how} --output --aov --json")),
+        ("render", format!("{scene} {how} --output --aov --json --frames --orbit")),
         ("info", format!("{scene} --json")),
         ("bench", "layer".into()),
         ("bench layer", format!("{scene} {how} --json")),
@@ -364,4 +364,46 @@ fn the_scene_of_the_readme_runs() {
     std::fs::write(folder.path("readme.toml"), scene).unwrap();
     let run = folder.good("render readme.toml --size 160x90 --surfels 20000");
     assert!(run.out.contains("pot and knot"), "{}", run.out);
+}
+
+#[test]
+fn an_orbit_is_a_picture_a_frame_and_its_restlessness() {
+    let folder = Folder::new();
+    folder.good(&format!("render {KNOT} {SMALL} -o still.png"));
+    let line = format!("render {KNOT} {SMALL} --frames 4 --orbit 8 -o a.png --json a.json");
+    let out = folder.good(&line).out;
+    let frames: Vec<_> = (0..4).map(|i| folder.read(&format!("a-000{i}.png"))).collect();
+    assert_eq!(folder.listing().len(), 6, "{:?}", folder.listing());
+    assert!(frames[0] == folder.read("still.png"), "it begins where the scene's eye is");
+    assert!(frames.windows(2).all(|pair| pair[0] != pair[1]));
+    let figures = folder.json("a.json");
+    let orbit = &figures["orbit"];
+    assert_eq!((&orbit["frames"], &orbit["degrees"]), (&4.into(), &8.0.into()));
+    for key in ["second_difference", "rms_median", "rms_max"] {
+        assert!(orbit[key].as_f64() > Some(0.0), "{key}: {figures}");
+    }
+    assert!(orbit["rms_max"].as_f64() >= orbit["rms_median"].as_f64());
+    assert!(out.contains("4 frames over 8 degrees"), "{out}");
+    // A whole turn does not show its first frame twice; an eye that does not move sees no change.
+    folder.good(&format!("render {KNOT} {SMALL} --frames 2 -o b.png --json b.json"));
+    assert!(folder.read("b-0000.png") != folder.read("b-0001.png"));
+    folder.good(&format!("render {KNOT} {SMALL} --frames 3 --orbit 0 -o c.png --json c.json"));
+    let still = &folder.json("c.json")["orbit"];
+    assert_eq!((&still["second_difference"], &still["rms_max"]), (&0.0.into(), &0.0.into()));
+}
+
+#[test]
+fn qualities_are_names_for_parameters() {
+    let folder = Folder::new();
+    let picture = |options: &str| {
+        folder.good(&format!("render {KNOT} {SMALL} {options} -o a.png"));
+        folder.read("a.png")
+    };
+    let squares = "--cameras triangles --splat square2";
+    assert!(picture("--quality draft") == picture(&format!("{squares} --detail 1")));
+    assert!(picture("--quality draft --detail 0") == picture(&format!("{squares} --detail 0")));
+    assert!(picture("--quality best") == picture("--detail 4"));
+    assert!(picture("--quality default") == picture(""));
+    assert!(picture("--quality best") != picture(""));
+    assert!(picture("--method raytrace --quality best") == picture("--method raytrace --spp 16"));
 }

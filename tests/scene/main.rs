@@ -5,6 +5,8 @@
 
 mod cells;
 mod detail;
+mod hiding;
+mod holes;
 mod light;
 mod moves;
 mod plane_mirror;

@@ -56,7 +56,7 @@ static INFO: MethodInfo = MethodInfo {
             about: "splats a pixel and layer: what would be more is drawn as representatives; 0: every surfel",
             unit: "",
             kind: ParamKind::Integer(0, 64),
-            default: Value::Integer(1),
+            default: Value::Integer(2),
             is_quality_knob: true,
         },
         ParamInfo {
