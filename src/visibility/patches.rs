@@ -101,8 +101,9 @@ impl Cell {
     }
 }
 
-/// Patches have at most about so many pixels, so that their tile stays in the innermost cache (untuned).
-const PATCH_PIXELS: u32 = 2048;
+/// Patches have at most about so many pixels, so that their tile stays in a cache. Measured: of 2048, 4096 and 8192 the
+/// last is the fastest at 3840 x 2160, and at 1280 x 720 there is no difference.
+const PATCH_PIXELS: u32 = 8192;
 /// Cells along an edge at most.
 const MAX_GRID: u32 = 64;
 
@@ -154,23 +155,30 @@ pub fn patches(
     scratch.visible.clear();
     let seen = (0u32..).zip(first.iter()).filter(|(_, e)| e.pixels > 0).map(|(t, _)| t);
     scratch.visible.extend(seen);
-    for &t in &scratch.visible {
-        let extent = first[t as usize];
-        let triangle = MirrorTriangleIndex(t);
-        if extent.pixels <= PATCH_PIXELS {
-            out.push(Patch {
-                triangle,
-                corners: [DVec3::X, DVec3::Y, DVec3::Z],
-                rect: extent.rect,
-                pixels: extent.pixels,
-                cell: None,
-                own: None,
-            });
-        } else {
-            let grid = Grid::new(eye, corners(triangle), extent.pixels);
-            cells(visibility, width, triangle, extent.rect, grid, out);
+    let first = &*first;
+    let lists = scratch.visible.par_chunks(16).map(|triangles| {
+        let mut list = Vec::new();
+        for &t in triangles {
+            let extent = first[t as usize];
+            let triangle = MirrorTriangleIndex(t);
+            if extent.pixels <= PATCH_PIXELS {
+                list.push(Patch {
+                    triangle,
+                    corners: [DVec3::X, DVec3::Y, DVec3::Z],
+                    rect: extent.rect,
+                    pixels: extent.pixels,
+                    cell: None,
+                    own: None,
+                });
+            } else {
+                let grid = Grid::new(eye, corners(triangle), extent.pixels);
+                cells(visibility, width, triangle, extent.rect, grid, &mut list);
+            }
         }
-    }
+        list
+    });
+    let lists: Vec<Vec<Patch>> = lists.collect();
+    out.extend(lists.into_iter().flatten());
 }
 
 fn count_row(row: &[u32], y: usize, extents: &mut [Extent]) {
