@@ -1,16 +1,16 @@
 //! Accurate reflections on curved mirrors, without ray-tracing hardware.
 //!
 //! Surfaces around a mirror are sampled into points once. For each frame, every visible triangle of the
-//! mirror becomes a *continuous 3-ray camera*, which maps a point straight to the pixels where it is seen
+//! mirror, or group of pixels with nearly linear rays, becomes a *continuous 3-ray camera*, which maps a point straight to the pixels where it is seen
 //! reflected: no search along rays (Mei, Popescu & Sacks 2007). A ray-traced reference comes along.
 //!
 //! # The flow
 //!
 //! ```text
-//! once    scene file ─► Scene ─► PreparedScene   surfels in the order of their kd-trees' leaves, triangles, light
+//! once    scene file ─► Scene ─► PreparedScene   surfels in the order of their kd-trees' leaves, mirrors' too; triangles, light
 //! frame   Eye ─► visibility ─► Visibility        per pixel: five samples of the direct view, and its mirror triangle
 //!         method ─► Plan                         passes as data
-//!           c3rc      patches ─► cameras ─► Splat, Resolve       (culled while it is executed: BatchSource)
+//!           c3rc      cells or patches ─► cameras ─► Splat, Resolve     (culled while it is executed: BatchSource)
 //!           raytrace  Gather
 //!         backend ─► Reflection                  per mirror pixel: radiance, coverage; on demand what was seen (Planes)
 //!         compose ─► Picture                     environment where nothing landed, tint, antialiased direct view
@@ -82,9 +82,11 @@
 //! - **Eye**: the viewer's pinhole. **Camera**: a continuous 3-ray camera (C3RC): a triangle of a mirror with
 //!   the reflected view ray at each corner; rays in between are interpolated.
 //! - **Surfel**: a point sample of a surface, with normal, colour and extent. **Representative**: a surfel that stands
-//!   for all of a tree node, their mean. **Samples**, per pixel, are those of the direct view, of the ray tracer (`spp`)
-//!   and of splatting (`samples`).
-//! - **Patch**: a visible mirror triangle, or a cell of a large one. **Batch**: a contiguous range of surfels
+//!   for all of a tree node, their mean. **Cloud**: the surfels of an object
+//!   or a mirror, with their tree; those of mirrors hide what is behind them. **Samples**, per pixel, are those of the
+//!   direct view and of the ray tracer (`spp`).
+//! - **Patch**: a visible mirror triangle, or a part of a large one; or a **cell**: pixels of a 32 × 32 tile whose exact
+//!   rays are nearly linear over the picture, across triangles. **Batch**: a contiguous range of surfels
 //!   that a camera has to project. **Image**: a place where a camera sees a surfel; there may be three.
 //! - **Layer**: the reflection before environment and direct view, and what it costs: patches, cameras,
 //!   clearing, culling, projection, splatting, resolve.
@@ -102,7 +104,11 @@
 //! - A camera draws a little outside its triangle (guard band), but only on pixels that are its triangle's:
 //!   otherwise surfels that a neighbour projects would be missing along the edges. The band is as wide as the
 //!   object's surfels lie apart on the screen, and no wider than a splat.
-//! - The nearest surfel wins only among those that the ray through the pixel's centre can see; farther ones fill
+//! - A cell's camera is up to half a pixel beside its pixels' exact rays. Each pixel keeps by how much, and images are
+//!   moved by that: the picture is that of the exact rays.
+//! - Ellipses of one patch are sorted by depth and fill their pixels in order, each by the part that it covers: layers
+//!   need no bands, and what a surface leaves open shows what is behind it.
+//! - Of squares, the nearest surfel wins only among those that the ray through the pixel's centre can see; farther ones fill
 //!   what is left. Where a pixel sees a whole room, the nearest of all would be wrong.
 //! - Depth is the distance from the mirror along the ray, behind a pre-pass that says which mirror triangle
 //!   a pixel shows. The paper's distance from the eye can let a hidden mirror's reflection win.
