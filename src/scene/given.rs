@@ -193,12 +193,16 @@ mod tests {
         let given = GivenSurfels { positions: &at, normals: &[Vec3::X], radiance: &[Vec3::ONE] };
         let scene = scene(given, EYE).unwrap();
         let eye = scene.eye_for(ImageSize { width: 160, height: 90 }).unwrap();
-        let params = Params::defaults(method("c3rc").unwrap().info().params);
-        let mut renderer = Renderer::new();
-        let cx = Context::default();
-        renderer.render(&scene, &eye, method("c3rc").unwrap(), &params, true, &cx).unwrap();
+        let c3rc = method("c3rc").unwrap();
+        let mut params = Params::defaults(c3rc.info().params);
+        let (mut renderer, cx) = (Renderer::new(), Context::default());
+        renderer.render(&scene, &eye, c3rc, &params, true, &cx).unwrap();
+        // Its disk is smaller than a pixel there.
         let seen = renderer.planes().unwrap().coverage.iter().filter(|c| **c > 0.0).count();
         assert!((1..=16).contains(&seen), "{seen}");
+        params.set(c3rc.info().param("splat"), "square2").unwrap();
+        let report = renderer.render(&scene, &eye, c3rc, &params, false, &cx).unwrap();
+        assert!((1..=4).contains(&report.covered_pixels), "{report:?}");
     }
 
     #[test]
