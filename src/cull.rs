@@ -228,6 +228,7 @@ impl Walk<'_> {
             V::<S>::bits(needed.le(seen) & real),
             V::<S>::bits(needed.le(seen * 2.0) & real),
             V::<S>::bits(needed.le(seen * 4.0) & real),
+            // Less than eight: parts are not of one size, and these are taken unseen.
             V::<S>::bits(needed.le(seen * 6.0) & real),
         ]
     }

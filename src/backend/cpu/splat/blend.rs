@@ -30,7 +30,7 @@ const SHOWN: usize = 4;
 const NEAR: usize = 5;
 /// How full it was when the first splat of a farther surface came; more than 1: none did.
 const FRONT: usize = 6;
-/// Index of the nearest splat that shows an object.
+/// Index of the nearest splat that shows an object, as bits: as a number it would be exact below 2^24 only.
 const FIRST: usize = 7;
 
 /// One patch's pixels, by slot of its tile.
@@ -219,7 +219,8 @@ impl Layers {
                     let unseen = mine & showed.le(zero);
                     if f32x8::<S>::any(unseen) {
                         let was: f32x8<S> = Vector::load(simd, &first[at..]);
-                        let index = f32x8::<S>::broadcast(simd, i as f32);
+                        #[expect(clippy::cast_possible_truncation, reason = "it was 32 bits")]
+                        let index = f32x8::<S>::broadcast(simd, f32::from_bits(i as u32));
                         Vector::store(Real::select(unseen, index, was), &mut first[at..]);
                     }
                     Vector::store(showed + part, &mut shown[at..]);
@@ -242,17 +243,12 @@ impl Layers {
         let get = |plane: usize, slot: usize| self.planes[plane][slot];
         let value =
             |slot: usize| Vec4::new(get(0, slot), get(1, slot), get(2, slot), get(SHOWN, slot));
-        let own = value(slot);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "an index, exact below 2^24"
-        )]
-        let first = get(FIRST, slot) as usize;
-        let found = |value: Vec4| (value.w > 0.0).then_some(Blended { value, first });
+        let mut own = value(slot);
+        if own.w == 0.0 {
+            return None;
+        }
         let beside = [(slot - 1, slot + 1), (slot - self.stride, slot + self.stride)];
         let full = get(FULL, slot);
-        let mut own = own;
         if (CLOSING..WHOLE).contains(&full) {
             let covered = beside.map(|(a, b)| get(FULL, a).min(get(FULL, b)));
             own *= covered[0].max(covered[1]).max(full) / full;
@@ -273,7 +269,8 @@ impl Layers {
             }
             own = own.lerp(between, (closed - front) / (1.0 - front));
         }
-        found(own)
+        let first = get(FIRST, slot).to_bits() as usize;
+        Some(Blended { value: own, first })
     }
 }
 
@@ -425,6 +422,12 @@ mod tests {
             layers.planes[NEAR][other] = 0.9;
         }
         assert!(is(layers.at(SLOT), 0.6, 0.4, 0.0, 1.0));
+        // What mirrors hide wholly shows no object, whatever its neighbours do.
+        let mut layers = gap(0.6, 0.4);
+        for plane in [0, 1, SHOWN] {
+            layers.planes[plane][SLOT] = 0.0;
+        }
+        assert_eq!(layers.at(SLOT), None);
         // Of the depths before and behind a splat, its range decides which are another surface.
         let parts = [
             [2.5, 2.5, 0.4, 0.3 / GAIN, 1.0],
