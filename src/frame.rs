@@ -107,8 +107,13 @@ impl Default for Renderer {
 impl Renderer {
     /// A renderer on the CPU.
     pub fn new() -> Self {
+        Self::on(Box::new(Cpu::default()))
+    }
+
+    /// A renderer on a backend.
+    pub fn on(backend: Box<dyn Backend>) -> Self {
         Self {
-            backend: Box::new(Cpu::default()),
+            backend,
             visibility: Visibility::default(),
             scratch: visibility::Scratch::default(),
             reflection: Reflection::default(),
@@ -185,7 +190,7 @@ impl Renderer {
             cameras: splats.then_some(done.cameras),
             batches: splats.then_some(done.batches),
             projections: splats.then_some(done.projections),
-            valid: splats.then_some(done.valid),
+            valid: done.valid,
             mirror_pixels: self.visibility.mirror_ids.iter().filter(|&&id| id != NONE_ID).count(),
             covered_pixels: self.reflection.coverage.iter().filter(|&&c| c >= 0.5).count(),
             cameras_ms: splats.then_some(plan.times.cameras_ms),

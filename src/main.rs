@@ -97,6 +97,8 @@ fn built_in_scene(cx: &Context) -> anyhow::Result<()> {
         how: HowArgs {
             method: "c3rc".into(),
             backend: "auto".into(),
+            adapter: None,
+            gpu_path: "compute".into(),
             preset: None,
             quality: "default".into(),
         },

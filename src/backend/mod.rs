@@ -1,11 +1,27 @@
 //! Backends execute plans. They know passes, not methods.
 
 pub mod cpu;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 
 use crate::error::Result;
 use crate::plan::{Plan, Reflection};
 use crate::scene::prepared::PreparedScene;
 use crate::visibility::Visibility;
+
+/// The backend that is the fastest here for a method: a graphics card's, if there is one and the method `has_shaders` (a
+/// software adapter is none), else the CPU's.
+pub fn fastest(has_shaders: bool) -> Box<dyn Backend> {
+    #[cfg(feature = "gpu")]
+    if has_shaders
+        && gpu::adapters().first().is_some_and(|adapter| !adapter.software)
+        && let Ok(gpu) = gpu::Gpu::new(gpu::Options::default())
+    {
+        return Box::new(gpu);
+    }
+    let _ = has_shaders;
+    Box::new(cpu::Cpu::default())
+}
 
 /// What executing a plan did and took. A stage that was not timed apart is `None`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -18,8 +34,8 @@ pub struct ExecuteReport {
     pub batches: u64,
     /// Camera–surfel pairs projected.
     pub projections: u64,
-    /// Pairs that have an image in the camera.
-    pub valid: u64,
+    /// Pairs that have an image in the camera, where they are counted.
+    pub valid: Option<u64>,
     /// Culling, milliseconds of all threads together by their number.
     pub cull_ms: Option<f64>,
     /// Projection, likewise.

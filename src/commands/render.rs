@@ -3,12 +3,16 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use catoptric::Context;
+#[cfg(feature = "gpu")]
+use catoptric::backend::gpu;
+use catoptric::backend::{Backend, cpu::Cpu, fastest};
 use catoptric::frame::{FrameReport, Renderer};
 use catoptric::geometry::lanes::simd_level;
 use catoptric::image::aov::{self, write_aov};
 use catoptric::image::io::{check_output, write_picture};
 use catoptric::image::temporal::{Restlessness, Sequence};
+use catoptric::methods::Method;
+use catoptric::{Context, Error};
 use clap::{ArgMatches, Args};
 use serde_json::{Value, json};
 
@@ -55,9 +59,15 @@ pub(crate) struct HowArgs {
     /// Reflection method: c3rc or raytrace
     #[arg(long, value_name = "ID", default_value = "c3rc")]
     pub(crate) method: String,
-    /// Where it runs: auto (whatever is fastest here) or cpu
-    #[arg(long, value_name = "ID", default_value = "auto", value_parser = ["auto", "cpu"])]
+    /// Where it runs: auto (whatever is fastest here), cpu or gpu
+    #[arg(long, value_name = "ID", default_value = "auto", value_parser = ["auto", "cpu", "gpu"])]
     pub(crate) backend: String,
+    /// Graphics adapter for --backend gpu: a part of its name, or its number in `info --adapters`
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) adapter: Option<String>,
+    /// Where the GPU projects: in compute shaders, or in a vertex shader as in the paper
+    #[arg(long, value_name = "PATH", default_value = "compute", value_parser = ["compute", "vertex"])]
+    pub(crate) gpu_path: String,
     /// Named set of parameters (paper: everything as Mei et al. had it)
     #[arg(long, value_name = "NAME")]
     pub(crate) preset: Option<String>,
@@ -65,6 +75,39 @@ pub(crate) struct HowArgs {
     #[arg(long, value_name = "WORD", default_value = "default", conflicts_with = "preset",
         value_parser = ["draft", "default", "best"])]
     pub(crate) quality: String,
+}
+
+impl HowArgs {
+    /// A renderer on the backend that is asked for.
+    pub(crate) fn renderer(&self, method: &dyn Method) -> anyhow::Result<Renderer> {
+        let backend: Box<dyn Backend> = match self.backend.as_str() {
+            "cpu" => Box::new(Cpu::default()),
+            "gpu" => self.gpu(method)?,
+            _ if self.adapter.is_some() => self.gpu(method)?,
+            _ => fastest(method.info().has_shaders),
+        };
+        Ok(Renderer::on(backend))
+    }
+
+    #[cfg(feature = "gpu")]
+    fn gpu(&self, method: &dyn Method) -> anyhow::Result<Box<dyn Backend>> {
+        if !method.info().has_shaders {
+            let problem = format!("--method {} has no shaders", method.info().id);
+            return Err(Error::input("--backend gpu", "", problem, "use --backend cpu, or auto").into());
+        }
+        let path = match self.gpu_path.as_str() {
+            "vertex" => gpu::Path::Vertex,
+            _ => gpu::Path::Compute,
+        };
+        let options = gpu::Options { adapter: self.adapter.clone(), path, ..Default::default() };
+        Ok(Box::new(gpu::Gpu::new(options)?))
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn gpu(&self, _method: &dyn Method) -> anyhow::Result<Box<dyn Backend>> {
+        let problem = "this program was built without the feature gpu";
+        Err(Error::input("--backend gpu", "", problem, "use --backend cpu").into())
+    }
 }
 
 pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyhow::Result<()> {
@@ -80,7 +123,7 @@ pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyh
     ])?;
     let (method, params, leaf) = chosen_method(&args.how, matches)?;
     let ready = args.scene.ready(leaf, cx)?;
-    let mut renderer = Renderer::new();
+    let mut renderer = args.how.renderer(method)?;
     if !args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         renderer.keep_bright();
     }

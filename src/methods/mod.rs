@@ -25,6 +25,8 @@ pub struct MethodInfo {
     pub about: &'static str,
     /// Where it comes from.
     pub citation: &'static str,
+    /// Whether the GPU can draw it: its passes have shaders.
+    pub has_shaders: bool,
     /// Its parameters.
     pub params: &'static [ParamInfo],
     /// Named sets of values.

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
@@ -188,6 +189,8 @@ pub struct PreparedScene {
     pub light: Light,
     /// What preparing took.
     pub times: PrepareTimes,
+    /// Another number for other surfels or other light on them, over all scenes of the program.
+    pub surfel_version: u64,
     /// How many trees were built since this scene was prepared: moving objects builds none.
     pub tree_builds: usize,
 }
@@ -278,6 +281,7 @@ impl PreparedScene {
             environment: scene.environment,
             light: scene.light,
             times,
+            surfel_version: 0,
         };
         let corners: Vec<[Vec3; 3]> = prepared
             .mirrors
@@ -346,6 +350,8 @@ impl PreparedScene {
 
     /// Gives the representatives the colours of what they stand for.
     fn average(&mut self) {
+        static VERSIONS: AtomicU64 = AtomicU64::new(1);
+        self.surfel_version = VERSIONS.fetch_add(1, Ordering::Relaxed);
         for cloud in &self.clouds[..self.objects.len()] {
             cloud.tree.average(&mut self.surfels.radiance, cloud.surfels.start as usize);
             cloud.tree.average(&mut self.surfels.albedo, cloud.surfels.start as usize);

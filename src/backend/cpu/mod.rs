@@ -2,7 +2,7 @@
 
 pub mod direct;
 pub mod finish;
-mod planes;
+pub(crate) mod planes;
 pub mod pool;
 pub mod splat;
 
@@ -61,7 +61,7 @@ impl Backend for Cpu {
                     report.patches += pass.patches.len();
                     report.batches += done.batches;
                     report.projections += done.projections;
-                    report.valid += done.valid;
+                    report.valid = Some(report.valid.unwrap_or(0) + done.valid);
                     let per_thread = 1e-6 / rayon::current_num_threads() as f64;
                     add(&mut report.cull_ms, done.cull_ns as f64 * per_thread);
                     add(&mut report.project_ms, done.project_ns as f64 * per_thread);

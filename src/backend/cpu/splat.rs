@@ -2,10 +2,10 @@
 //! key of 0 marks pixels of others, so that one comparison decides ownership and depth. The task ends with its
 //! pixels' colours, so that no picture of keys is ever written.
 
-mod blend;
+pub(crate) mod blend;
 mod hits;
 mod packed;
-mod projection;
+pub(crate) mod projection;
 
 use std::time::Instant;
 

@@ -11,7 +11,7 @@ pub struct Cubic<R> {
 }
 
 /// Enough for bisection alone to end at the precision of f32; a smooth piece takes two or three.
-const MAX_STEPS: usize = 24;
+pub(crate) const MAX_STEPS: usize = 24;
 
 impl<R: Real> Cubic<R> {
     /// F(λ).

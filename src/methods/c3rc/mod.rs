@@ -26,6 +26,7 @@ static INFO: MethodInfo = MethodInfo {
     id: "c3rc",
     about: "point splatting with continuous 3-ray cameras",
     citation: "Mei, Popescu & Sacks 2007, A Hybrid Backward-Forward Method for Interactive Reflections",
+    has_shaders: true,
     params: &[
         ParamInfo {
             id: "cameras",

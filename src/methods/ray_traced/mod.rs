@@ -18,6 +18,7 @@ static INFO: MethodInfo = MethodInfo {
     id: "raytrace",
     about: "ray-traced reference with interpolated normals",
     citation: "Whitted 1980, An Improved Illumination Model for Shaded Display; BVH of the obvhs crate",
+    has_shaders: false,
     params: &[
         ParamInfo {
             id: "rays",

@@ -10,13 +10,13 @@ use crate::geometry::lanes::{Real, Vector};
 
 /// How much of a pixel splats cover for each part that their areas say: they are not spread so evenly that the areas
 /// add up everywhere (untuned).
-const GAIN: f32 = 1.3;
+pub(crate) const GAIN: f32 = 1.3;
 /// From this coverage on a gap between covered pixels is closed (untuned).
-const CLOSING: f32 = 0.4;
+pub(crate) const CLOSING: f32 = 0.4;
 /// Of a pixel that is covered, but for rounding.
-const WHOLE: f32 = 0.999_99;
+pub(crate) const WHOLE: f32 = 0.999_99;
 /// Pixels show one surface if their depths differ by less than this share (untuned).
-const SAME_SURFACE: f32 = 0.02;
+pub(crate) const SAME_SURFACE: f32 = 0.02;
 /// Splats drawn before it is asked whether any pixel is still open (untuned).
 const UNTIL_FULL: usize = 32;
 

@@ -24,9 +24,9 @@ struct Kernel<R> {
 }
 
 /// The kernel of a disk is so many times as wide as the disk that holds a surfel (untuned).
-const SPREAD: f32 = 1.3;
+pub(crate) const SPREAD: f32 = 1.3;
 /// Radius of the kernel of a point, in pixels: what a pixel sees of it (untuned).
-const PIXEL: f32 = 0.7;
+pub(crate) const PIXEL: f32 = 0.7;
 
 impl<R: Real<Scalar = f32>> Kernel<R> {
     /// Of the disk that holds a surfel, see [`Frame::form`].
@@ -71,13 +71,13 @@ impl<R: Real<Scalar = f32>> Frame<R> {
 }
 
 /// A surfel's own disk has this share of the area of the one that holds a surfel.
-const PER_DISK: f32 = 1.0 / (EVENNESS * EVENNESS);
+pub(crate) const PER_DISK: f32 = 1.0 / (EVENNESS * EVENNESS);
 /// Surfels are not taken for thinner than this share of their width (untuned).
-const LEAST_FACING: f32 = 0.2;
+pub(crate) const LEAST_FACING: f32 = 0.2;
 /// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
-const MOST_CORRECTION_PX: f32 = 2.0;
+pub(crate) const MOST_CORRECTION_PX: f32 = 2.0;
 /// Surfels within so many of their radii in depth show one surface (untuned).
-const SAME_SURFACE: f32 = 3.0;
+pub(crate) const SAME_SURFACE: f32 = 3.0;
 /// Of any vector.
 const MOST_LANES: usize = 32;
 

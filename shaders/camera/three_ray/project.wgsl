@@ -1,0 +1,58 @@
+// From a point to its images in one camera. A camera's rows are those of backend/gpu/records.rs.
+
+struct Image {
+    lambda: f32,
+    b2: f32,
+    b3: f32,
+    found: bool,
+}
+
+/// form.x + b2 form.y + b3 form.z.
+fn linear(image: Image, form: vec3<f32>) -> f32 {
+    return image.b2 * form.y + image.b3 * form.z + form.x;
+}
+
+/// Lanes in which all three weights are at least -margin.
+fn within(image: Image, margin: vec3<f32>) -> bool {
+    let b1 = 1.0 - image.b2 - image.b3;
+    return image.found && -margin.x <= b1 && -margin.y <= image.b2 && -margin.z <= image.b3;
+}
+
+fn cubic(camera: u32, q: vec3<f32>) -> vec4<f32> {
+    let n0 = row(camera + N0);
+    let n1 = row(camera + N1);
+    let n2 = row(camera + N2);
+    return vec4(dot(q, n0.xyz), dot(q, n1.xyz) - n0.w, dot(q, n2.xyz) - n1.w, -n2.w);
+}
+
+/// Narrows λ to where v1 + `q` can have an image in the grown camera.
+fn bracket(camera: u32, q: vec3<f32>, lambda: vec2<f32>) -> vec2<f32> {
+    let axis = row(camera + AXIS);
+    if axis.w != 0.0 {
+        return lambda;
+    }
+    let ends = (vec4(dot(q, axis.xyz)) - row(camera + START)) * row(camera + PER_AXIS);
+    let size = abs(ends);
+    let slack = (size.x + size.y + size.z + size.w) * 1e-5;
+    let least = min(min(ends.x, ends.y), min(ends.z, ends.w));
+    let most = max(max(ends.x, ends.y), max(ends.z, ends.w));
+    return vec2(max(least - slack, lambda.x), min(most + slack, lambda.y));
+}
+
+fn image_at(camera: u32, q: vec3<f32>, root: Root) -> Image {
+    let lambda = root.lambda;
+    let e1 = lambda * row(camera + F1).xyz + row(camera + E1).xyz;
+    let e2 = lambda * row(camera + F2).xyz + row(camera + E2).xyz;
+    let x = q - lambda * row(camera + D1).xyz;
+    let n = cross(e1, e2);
+    let nn = dot(n, n);
+    let solid = 0.0 < nn;
+    let inverse = 1.0 / select(1.0, nn, solid);
+    return Image(lambda, dot(cross(x, e2), n) * inverse, dot(cross(e1, x), n) * inverse, root.found && solid);
+}
+
+/// The image whose λ lies in one of the pieces of the bracket.
+fn project(camera: u32, q: vec3<f32>, lambda: vec2<f32>, piece: u32) -> Image {
+    let narrow = bracket(camera, q, lambda);
+    return image_at(camera, q, root_in_piece(cubic(camera, q), narrow.x, narrow.y, piece));
+}

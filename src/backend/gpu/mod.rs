@@ -1,0 +1,344 @@
+//! The GPU backend: culled on the CPU, projected and splatted through wgpu. Surfels are uploaded once; per frame only
+//! the plan crosses the bus, and the reflection comes back.
+//!
+//! What a vertex or compute shader does is in `shaders/`, in files of the same names as the Rust code that they are
+//! twins of.
+
+mod adapters;
+mod buffers;
+mod device;
+mod pipelines;
+mod records;
+mod scene;
+mod shaders;
+#[cfg(test)]
+mod tests;
+mod timing;
+
+use std::time::Instant;
+
+use glam::{Vec3, Vec4};
+
+pub use self::adapters::{Adapter, adapters};
+use self::buffers::{Grown, PictureBuffers};
+use self::device::Gpu as Device;
+pub use self::device::Limits;
+use self::pipelines::Pipelines;
+use self::records::Records;
+use self::scene::SceneBuffers;
+use self::timing::Timing;
+use super::cpu::planes::{mark_mirrors, splat_planes};
+use super::cpu::splat::{EMPTY, Landed};
+use super::{Backend, ExecuteReport};
+use crate::error::{Error, Result};
+use crate::image::Planes;
+use crate::plan::{Pass, Plan, Reflection, SplatPass, SplatShape};
+use crate::scene::prepared::{PreparedScene, milliseconds};
+use crate::visibility::Visibility;
+
+/// How splats are projected and drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Path {
+    /// In a vertex shader, as in the paper: points and quads, drawn by the rasteriser.
+    Vertex,
+    /// In a compute shader.
+    #[default]
+    Compute,
+}
+
+/// What a [`Gpu`] is made with.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Part of the adapter's name, or its number as listed; `None`: the first one.
+    pub adapter: Option<String>,
+    /// See [`Path`].
+    pub path: Path,
+    /// See [`Limits`].
+    pub limits: Limits,
+}
+
+/// The backend; keeps everything on the device between frames.
+pub struct Gpu {
+    options: Options,
+    name: String,
+    ready: Option<Ready>,
+}
+
+/// Everything on one device; gone when that is lost.
+struct Ready {
+    gpu: Device,
+    pipelines: Vec<(SplatShape, Pipelines)>,
+    scene: Option<SceneBuffers>,
+    plan: Grown,
+    picture: Option<PictureBuffers>,
+    timing: Option<Timing>,
+    records: Records,
+    /// Entries of the pixels' lists that there is room for.
+    capacity: u32,
+}
+
+/// Entries that lists begin with.
+const FIRST_CAPACITY: u32 = 1 << 20;
+
+impl Gpu {
+    /// A backend on an adapter.
+    ///
+    /// # Errors
+    /// There is no such adapter, or it does not give a device.
+    pub fn new(options: Options) -> Result<Self> {
+        let ready = Ready::new(&options)?;
+        Ok(Self { name: ready.gpu.name.clone(), ready: Some(ready), options })
+    }
+
+    /// The adapter's name.
+    pub fn adapter(&self) -> &str {
+        &self.name
+    }
+
+    /// Buffers made on the device since it was opened.
+    #[cfg(test)]
+    fn allocations(&self) -> usize {
+        self.ready.as_ref().map_or(0, |ready| ready.gpu.allocations.get())
+    }
+
+    /// Loses the device, as a driver may at any time.
+    #[cfg(test)]
+    fn lose(&self) {
+        if let Some(ready) = &self.ready {
+            ready.gpu.device.destroy();
+            ready.gpu.wait();
+        }
+    }
+}
+
+impl Ready {
+    fn new(options: &Options) -> Result<Self> {
+        let gpu = Device::open(options.adapter.as_deref(), options.limits)?;
+        Ok(Self {
+            timing: Timing::new(&gpu)?,
+            plan: Grown::new("plan", wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST),
+            gpu,
+            pipelines: Vec::new(),
+            scene: None,
+            picture: None,
+            records: Records::default(),
+            capacity: FIRST_CAPACITY,
+        })
+    }
+}
+
+impl Backend for Gpu {
+    fn id(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn execute(
+        &mut self,
+        plan: &Plan<'_>,
+        scene: &PreparedScene,
+        visibility: &Visibility,
+        planes: bool,
+        out: &mut Reflection,
+    ) -> Result<ExecuteReport> {
+        assert_eq!(plan.missing_resource(), None, "the plan's passes are out of order");
+        for again in [true, false] {
+            let ready = match &mut self.ready {
+                Some(ready) => ready,
+                none => none.insert(Ready::new(&self.options)?),
+            };
+            let done = ready.execute(plan, scene, visibility, planes, self.options.path, out);
+            let lost = ready.gpu.is_lost();
+            if lost {
+                // Everything on it is gone.
+                self.ready = None;
+            }
+            if !(lost && again) {
+                return done;
+            }
+        }
+        unreachable!("the second try returns")
+    }
+}
+
+impl Ready {
+    fn execute(
+        &mut self,
+        plan: &Plan<'_>,
+        scene: &PreparedScene,
+        visibility: &Visibility,
+        planes: bool,
+        path: Path,
+        out: &mut Reflection,
+    ) -> Result<ExecuteReport> {
+        let size = visibility.size;
+        out.planes = planes.then(|| {
+            let mut planes = Box::new(Planes::empty(size.width, size.height));
+            mark_mirrors(scene, visibility, &mut planes);
+            planes
+        });
+        out.environment_included = false;
+        let mut report = ExecuteReport::default();
+        for pass in &plan.passes {
+            match pass {
+                Pass::Splat(pass) => {
+                    report = self.splat(pass, scene, visibility, planes, path, out)?;
+                }
+                // Splats are resolved where they are drawn.
+                Pass::Resolve => {}
+                Pass::Gather(_) => {
+                    return Err(Error::input(
+                        "--backend gpu",
+                        "",
+                        "this method has no shaders",
+                        "use --backend cpu, or auto",
+                    ));
+                }
+            }
+        }
+        Ok(report)
+    }
+
+    fn splat(
+        &mut self,
+        pass: &SplatPass<'_>,
+        scene: &PreparedScene,
+        visibility: &Visibility,
+        planes: bool,
+        path: Path,
+        out: &mut Reflection,
+    ) -> Result<ExecuteReport> {
+        let version = scene.surfel_version;
+        if self.scene.as_ref().is_none_or(|s| s.version != version) {
+            // The old one's memory first.
+            self.scene = None;
+            self.scene = Some(SceneBuffers::new(&self.gpu, scene)?);
+        }
+        let start = Instant::now();
+        let mut report = self.records.fill(pass, visibility);
+        let pipelines = match self.pipelines.iter().position(|(shape, _)| *shape == pass.shape) {
+            Some(i) => i,
+            None => {
+                self.pipelines.push((pass.shape, Pipelines::new(&self.gpu, pass.shape)?));
+                self.pipelines.len() - 1
+            }
+        };
+        loop {
+            let needed = self.draw(pipelines, visibility, planes, path)?;
+            if needed <= self.capacity {
+                break;
+            }
+            // More splats than there was room for: once more, with room.
+            let most = self.gpu.most_elements(size_of::<[u32; 4]>());
+            if needed > most {
+                return Err(Error::input(
+                    "--backend gpu",
+                    "",
+                    format!(
+                        "this picture needs {needed} entries for its splats, and {} holds {most}",
+                        self.gpu.name
+                    ),
+                    "use a lower --detail or --size, or --backend cpu",
+                ));
+            }
+            self.capacity = needed.saturating_add(needed / 4).min(most);
+        }
+        self.read(visibility, planes, out)?;
+        if let Some(timing) = &self.timing {
+            let [project, resolve] = timing.milliseconds(&self.gpu)?;
+            (report.project_ms, report.splat_ms) = (Some(project), Some(resolve));
+        }
+        report.passes_ms = Some(milliseconds(start));
+        if let Some(list) = &mut out.planes {
+            let landed = self.landed(visibility, out.coverage.as_slice())?;
+            splat_planes(pass, scene, visibility, &[landed], list);
+        }
+        Ok(report)
+    }
+
+    /// Draws and resolves; returns how many entries lists would have needed.
+    fn draw(
+        &mut self,
+        pipelines: usize,
+        visibility: &Visibility,
+        planes: bool,
+        path: Path,
+    ) -> Result<u32> {
+        let gpu = &self.gpu;
+        let size = visibility.size;
+        let pipelines = &self.pipelines[pipelines].1;
+        let lists = pipelines.shape == SplatShape::Ellipse;
+        let rows = self.records.rows();
+        self.plan.hold(gpu, size_of_val(rows) as u64)?;
+        if self.picture.as_ref().is_none_or(|p| !p.fits(size, self.capacity, lists)) {
+            self.picture = None;
+            self.picture = Some(PictureBuffers::new(gpu, size, self.capacity, lists)?);
+        }
+        let scene = self.scene.as_ref().expect("it was uploaded");
+        let picture = self.picture.as_mut().expect("it was made");
+        gpu.checked(|| {
+            gpu.queue.write_buffer(self.plan.buffer(), 0, bytemuck::cast_slice(rows));
+            let frame = self.records.frame(self.capacity);
+            gpu.queue.write_buffer(&picture.frame, 0, bytemuck::bytes_of(&frame));
+            let groups = pipelines.groups(gpu, scene, self.plan.buffer(), picture);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            encoder.clear_buffer(&picture.heads, 0, None);
+            if let Some(tails) = &picture.tails {
+                encoder.clear_buffer(tails, 0, None);
+            }
+            let chunks = self.records.chunks();
+            pipelines.encode(&mut encoder, &groups, picture, path, chunks, self.timing.as_ref());
+            if lists {
+                encoder.copy_buffer_to_buffer(&picture.heads, 0, &picture.count, 0, 4);
+            }
+            picture.copy_out(&mut encoder, planes);
+            if let Some(timing) = &self.timing {
+                timing.copy_out(&mut encoder);
+            }
+            gpu.queue.submit([encoder.finish()]);
+        })?;
+        if !lists {
+            return Ok(0);
+        }
+        let count = gpu.read::<u32, u32>(&picture.count, 4, |count| count[0])?;
+        // The first one is not used.
+        Ok(count.saturating_add(1))
+    }
+
+    /// The reflection back to the CPU.
+    fn read(&self, visibility: &Visibility, planes: bool, out: &mut Reflection) -> Result<()> {
+        let picture = self.picture.as_ref().expect("it was drawn");
+        let pixels = visibility.size.pixels();
+        out.radiance.resize(pixels, Vec3::ZERO);
+        out.coverage.resize(pixels, 0.0);
+        let bytes = pixels as u64 * 16;
+        self.gpu.read::<[f32; 4], ()>(&picture.colors_out, bytes, |colors| {
+            use rayon::prelude::*;
+            let to = out.radiance.par_iter_mut().zip(&mut out.coverage);
+            to.zip(colors).for_each(|((radiance, coverage), color)| {
+                let color = Vec4::from_array(*color);
+                *coverage = color.w;
+                if color.w > 0.0 {
+                    *radiance = color.truncate();
+                }
+            });
+        })?;
+        let _ = planes;
+        Ok(())
+    }
+
+    /// The nearest of every pixel, for what was seen.
+    fn landed(&self, visibility: &Visibility, coverage: &[f32]) -> Result<Vec<Landed>> {
+        let picture = self.picture.as_ref().expect("it was drawn");
+        let bytes = visibility.size.pixels() as u64 * 8;
+        self.gpu.read::<[u32; 2], _>(&picture.nearest_out, bytes, |keys| {
+            let mut landed = Vec::new();
+            for ((pixel, &[depth, surfel]), &coverage) in (0u32..).zip(keys).zip(coverage) {
+                let key = u64::from(depth) << 32 | u64::from(surfel);
+                if key != EMPTY {
+                    landed.push(Landed { pixel, coverage, radiance: Vec3::ZERO, key });
+                }
+            }
+            landed
+        })
+    }
+}

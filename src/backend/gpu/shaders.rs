@@ -1,0 +1,119 @@
+//! The shaders' texts: constants of the Rust code, then the files.
+
+use std::fmt::Write as _;
+
+use super::records::{LAYOUT, NO_OWNER};
+use crate::backend::cpu::splat::{blend, projection};
+use crate::camera::three_ray::solve::MAX_STEPS;
+use crate::geometry::lanes::Scalar;
+use crate::plan::{CELL_SLACK_PX, LARGEST_ELLIPSE, SplatShape};
+
+/// Workgroups along the first dimension of a grid: the most that every device has, and a power of two.
+pub(super) const GROUPS: u32 = 1 << 15;
+
+macro_rules! file {
+    ($path:literal) => {
+        include_str!(concat!("../../../shaders/", $path))
+    };
+}
+
+const PLAN: &str = file!("plan.wgsl");
+const SOLVE: &str = file!("camera/three_ray/solve.wgsl");
+const PROJECT: &str = file!("camera/three_ray/project.wgsl");
+const PROJECTION: &str = file!("splat/projection.wgsl");
+const LISTS: &str = file!("splat/lists.wgsl");
+const KEYS: &str = file!("splat/keys.wgsl");
+const KEYS_64: &str = file!("splat/keys64.wgsl");
+const RADIANCE: &str = file!("splat/radiance.wgsl");
+const VERTEX: &str = file!("passes/vertex.wgsl");
+const VERTEX_LISTS: &str = file!("passes/vertex_lists.wgsl");
+const VERTEX_KEYS: &str = file!("passes/vertex_keys.wgsl");
+const COMPUTE: &str = file!("passes/compute.wgsl");
+const COMPUTE_LISTS: &str = file!("passes/compute_lists.wgsl");
+const COMPUTE_KEYS: &str = file!("passes/compute_keys.wgsl");
+const RESOLVE_LISTS: &str = file!("passes/resolve_lists.wgsl");
+const RESOLVE_KEYS: &str = file!("passes/resolve_keys.wgsl");
+const CLOSE: &str = file!("passes/close.wgsl");
+
+/// One constant, one place: those of the Rust code.
+fn constants(shape: SplatShape) -> String {
+    let mut text = String::new();
+    let mut word = |name: &str, value: u32| {
+        writeln!(text, "const {name}: u32 = {value}u;").expect("strings grow");
+    };
+    for (name, value) in LAYOUT {
+        word(name, value);
+    }
+    let (side, corners) = match shape {
+        SplatShape::Square1 => (1, 1),
+        SplatShape::Square2 => (2, 6),
+        SplatShape::Ellipse => (0, 6),
+    };
+    word("SIDE", side);
+    word("CORNERS", corners);
+    word("GROUPS", GROUPS);
+    word("NO_OWNER", NO_OWNER);
+    word("MAX_STEPS", u32::try_from(MAX_STEPS).expect("few"));
+    #[expect(clippy::cast_possible_truncation, reason = "a power of two")]
+    let epsilon = <f32 as Scalar>::ROOT_EPSILON as f32;
+    let numbers = [
+        ("ROOT_EPSILON", epsilon),
+        ("REACH", shape.reach()),
+        ("LARGEST_ELLIPSE", LARGEST_ELLIPSE),
+        ("CELL_SLACK_PX", CELL_SLACK_PX),
+        ("SPREAD", projection::SPREAD),
+        ("PIXEL", projection::PIXEL),
+        ("PER_DISK", projection::PER_DISK),
+        ("LEAST_FACING", projection::LEAST_FACING),
+        ("MOST_CORRECTION_PX", projection::MOST_CORRECTION_PX),
+        ("SAME_SURFACE_RADII", projection::SAME_SURFACE),
+        ("SAME_SURFACE_SHARE", blend::SAME_SURFACE),
+        ("GAIN", blend::GAIN),
+        ("CLOSING", blend::CLOSING),
+        ("WHOLE", blend::WHOLE),
+    ];
+    for (name, value) in numbers {
+        writeln!(text, "const {name}: f32 = {value:?}f;").expect("strings grow");
+    }
+    let ellipse = shape == SplatShape::Ellipse;
+    writeln!(text, "const ELLIPSE: bool = {ellipse};").expect("strings grow");
+    text
+}
+
+/// Projection by one of the paths; `wide`: keys of 64 bits.
+pub(super) fn splat(shape: SplatShape, vertex: bool, wide: bool) -> String {
+    let ellipse = shape == SplatShape::Ellipse;
+    let store = match (ellipse, wide) {
+        (true, _) => LISTS,
+        (false, true) => KEYS_64,
+        (false, false) => KEYS,
+    };
+    let [passes, cover] = match (vertex, ellipse) {
+        (true, true) => [VERTEX, VERTEX_LISTS],
+        (true, false) => [VERTEX, VERTEX_KEYS],
+        (false, true) => [COMPUTE, COMPUTE_LISTS],
+        (false, false) => [COMPUTE, COMPUTE_KEYS],
+    };
+    [&constants(shape), PLAN, SOLVE, PROJECT, PROJECTION, store, passes, cover].concat()
+}
+
+/// From lists or keys to colours.
+pub(super) fn resolve(shape: SplatShape, wide: bool) -> String {
+    let constants = constants(shape);
+    match (shape, wide) {
+        (SplatShape::Ellipse, _) => [&constants, PLAN, LISTS, RADIANCE, RESOLVE_LISTS].concat(),
+        (_, true) => [&constants, PLAN, KEYS_64, RADIANCE, RESOLVE_KEYS].concat(),
+        (_, false) => [&constants, PLAN, KEYS, RADIANCE, RESOLVE_KEYS].concat(),
+    }
+}
+
+/// Closing gaps.
+pub(super) fn close() -> String {
+    [&constants(SplatShape::Ellipse), PLAN, CLOSE].concat()
+}
+
+/// The projection alone, behind which a test puts its entry point.
+#[cfg(test)]
+pub(super) fn projection_for_tests(shape: SplatShape) -> String {
+    [&constants(shape), PLAN, SOLVE, PROJECT, PROJECTION].concat()
+}
