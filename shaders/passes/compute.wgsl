@@ -11,8 +11,9 @@ fn project_lane(group: vec3<u32>, lane: u32, again: bool) {
     }
     let place = vec3(surfel_x[job.surfel], surfel_y[job.surfel], surfel_z[job.surfel]);
     let q = place - row(job.camera + V1).xyz;
-    for (var piece = 0u; piece < PIECES; piece++) {
-        let image = project(job.camera, q, job.lambda, piece);
+    let images = images_of(job.camera, q, job.lambda);
+    for (var piece = 0u; piece < images.pieces.count; piece++) {
+        let image = project(job.camera, images, piece);
         if !image.found {
             continue;
         }

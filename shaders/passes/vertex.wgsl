@@ -25,11 +25,12 @@ fn splat_corner(@builtin(vertex_index) index: u32, @builtin(instance_index) inst
     var s: Splat;
     let place = vec3(surfel_x[job.surfel], surfel_y[job.surfel], surfel_z[job.surfel]);
     let q = place - row(job.camera + V1).xyz;
-    if job.piece < PIECES {
-        s = splat_of(job, project(job.camera, q, job.lambda, job.piece));
-    } else {
-        for (var piece = 0u; piece < PIECES; piece++) {
-            let image = project(job.camera, q, job.lambda, piece);
+    let images = images_of(job.camera, q, job.lambda);
+    if job.piece < images.pieces.count {
+        s = splat_of(job, project(job.camera, images, job.piece));
+    } else if job.piece == PIECES {
+        for (var piece = 0u; piece < images.pieces.count; piece++) {
+            let image = project(job.camera, images, piece);
             s = splat_of(job, image);
             if s.drawn || (frame.first_root != 0u && is_seen(job.camera, image)) {
                 break;

@@ -51,8 +51,25 @@ fn image_at(camera: u32, q: vec3<f32>, root: Root) -> Image {
     return Image(lambda, dot(cross(x, e2), n) * inverse, dot(cross(e1, x), n) * inverse, root.found && solid);
 }
 
-/// The image whose λ lies in one of the pieces of the bracket.
-fn project(camera: u32, q: vec3<f32>, lambda: vec2<f32>, piece: u32) -> Image {
+/// A point's cubic and where its roots may be: one image a piece.
+struct Images {
+    q: vec3<f32>,
+    cubic: vec4<f32>,
+    pieces: Pieces,
+}
+
+/// Of the point v1 + `q` with λ in a range.
+fn images_of(camera: u32, q: vec3<f32>, lambda: vec2<f32>) -> Images {
+    let c = cubic(camera, q);
     let narrow = bracket(camera, q, lambda);
-    return image_at(camera, q, root_in_piece(cubic(camera, q), narrow.x, narrow.y, piece));
+    return Images(q, c, pieces_between(c, narrow.x, narrow.y));
+}
+
+/// The image whose λ lies in one of the pieces.
+fn project(camera: u32, images: Images, piece: u32) -> Image {
+    let root = root_in_piece(images.cubic, images.pieces, piece);
+    if !root.found {
+        return Image(root.lambda, 0.0, 0.0, false);
+    }
+    return image_at(camera, images.q, root);
 }

@@ -82,16 +82,20 @@ fn monotone_root(c: vec4<f32>, lo: f32, hi: f32, closed: bool) -> Root {
     return Root(x, true);
 }
 
-/// The root in one of the pieces of `lo..=hi` on which the cubic is monotone, in rising order.
-fn root_in_piece(c: vec4<f32>, lo: f32, hi: f32, piece: u32) -> Root {
+/// The ends of the pieces of a bracket on which the cubic is monotone: `count` of them, one or three.
+struct Pieces {
+    ends: vec4<f32>,
+    count: u32,
+}
+
+fn pieces_between(c: vec4<f32>, lo: f32, hi: f32) -> Pieces {
     if !bends(c, lo, hi) {
-        if piece > 0u {
-            return Root(lo, false);
-        }
-        return monotone_root(c, lo, hi, true);
+        return Pieces(vec4(lo, hi, hi, hi), 1u);
     }
-    let at = critical_points(c, lo, hi);
-    let begin = select(select(at.y, at.x, piece == 1u), lo, piece == 0u);
-    let end = select(select(hi, at.y, piece == 1u), at.x, piece == 0u);
-    return monotone_root(c, begin, end, piece == 0u);
+    return Pieces(vec4(lo, critical_points(c, lo, hi), hi), 3u);
+}
+
+/// The root in one of the pieces, which are in rising order.
+fn root_in_piece(c: vec4<f32>, pieces: Pieces, piece: u32) -> Root {
+    return monotone_root(c, pieces.ends[piece], pieces.ends[piece + 1u], piece == 0u);
 }
