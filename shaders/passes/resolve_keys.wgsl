@@ -1,6 +1,5 @@
 // From keys to pixels.
 
-@group(0) @binding(2) var<storage, read> radiance: array<u32>;
 @group(0) @binding(3) var<storage, read_write> reflection: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read_write> nearest: array<vec2<u32>>;
 
@@ -15,7 +14,7 @@ fn resolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     let key = ~key_at(pixel);
     let shows = key.x != NONE && key.y < frame.first_hider;
     if shows {
-        reflection[pixel] = vec4(unpack_radiance(radiance[key.y]), 1.0);
+        reflection[pixel] = vec4(radiance_of(key.y), 1.0);
         nearest[pixel] = key;
     } else {
         reflection[pixel] = vec4(0.0);

@@ -1,7 +1,6 @@
 // From lists to pixels. Twin of backend/cpu/splat/blend.rs, but that a pixel looks for its splats itself, the nearest
 // first.
 
-@group(0) @binding(2) var<storage, read> radiance: array<u32>;
 /// Radiance times coverage, coverage.
 @group(0) @binding(3) var<storage, read_write> colors: array<vec4<f32>>;
 /// How full the pixel is, depth of its nearest splat, how full it was when a farther surface came.
@@ -63,7 +62,7 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             if color.w <= 0.0 {
                 first = found;
             }
-            color += vec4(unpack_radiance(radiance[found.y]), 1.0) * part;
+            color += vec4(radiance_of(found.y), 1.0) * part;
         }
     }
     colors[pixel] = color;

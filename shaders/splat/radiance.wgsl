@@ -1,5 +1,9 @@
-/// Three numbers of nine bits and their exponent.
-fn unpack_radiance(bits: u32) -> vec3<f32> {
-    let scale = ldexp(1.0, i32(bits >> 27u) - 24);
-    return vec3(f32(bits & 511u), f32(bits >> 9u & 511u), f32(bits >> 18u & 511u)) * scale;
+// Colours of the surfels.
+
+/// Two halves.
+@group(0) @binding(2) var<storage, read> radiance_rg: array<u32>;
+@group(0) @binding(6) var<storage, read> radiance_b: array<f32>;
+
+fn radiance_of(surfel: u32) -> vec3<f32> {
+    return vec3(unpack2x16float(radiance_rg[surfel]), radiance_b[surfel]);
 }

@@ -93,7 +93,9 @@ impl HowArgs {
     fn gpu(&self, method: &dyn Method) -> anyhow::Result<Box<dyn Backend>> {
         if !method.info().has_shaders {
             let problem = format!("--method {} has no shaders", method.info().id);
-            return Err(Error::input("--backend gpu", "", problem, "use --backend cpu, or auto").into());
+            return Err(
+                Error::input("--backend gpu", "", problem, "use --backend cpu, or auto").into()
+            );
         }
         let path = match self.gpu_path.as_str() {
             "vertex" => gpu::Path::Vertex,

@@ -28,6 +28,9 @@ pub(super) struct Gpu {
     pub(super) queue: wgpu::Queue,
     pub(super) limits: wgpu::Limits,
     pub(super) features: wgpu::Features,
+    /// For tests: what is replaced in every shader, and by what.
+    #[cfg(test)]
+    pub(super) mutant: Option<[&'static str; 2]>,
     /// Buffers made so far.
     pub(super) allocations: Cell<usize>,
     lost: Arc<AtomicBool>,
@@ -55,7 +58,17 @@ impl Gpu {
         device.set_device_lost_callback(move |_, _| flag.store(true, Ordering::Relaxed));
         // Errors are asked for where they can happen; what comes otherwise must not end the program.
         device.on_uncaptured_error(Arc::new(|_| {}));
-        Ok(Self { name, device, queue, limits, features, allocations: Cell::new(0), lost })
+        Ok(Self {
+            name,
+            device,
+            queue,
+            limits,
+            features,
+            #[cfg(test)]
+            mutant: None,
+            allocations: Cell::new(0),
+            lost,
+        })
     }
 
     pub(super) fn is_lost(&self) -> bool {
@@ -146,7 +159,8 @@ impl Gpu {
         let mapped = receive.recv().map_err(|e| e.to_string());
         let mapped = mapped.and_then(|done| done.map_err(|e| e.to_string()));
         mapped.map_err(|e| failed(&self.name, &e))?;
-        let view = buffer.get_mapped_range(0..bytes).map_err(|e| failed(&self.name, &e.to_string()))?;
+        let view =
+            buffer.get_mapped_range(0..bytes).map_err(|e| failed(&self.name, &e.to_string()))?;
         let result = use_it(bytemuck::cast_slice(&view));
         drop(view);
         buffer.unmap();

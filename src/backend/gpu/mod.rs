@@ -23,7 +23,7 @@ pub use self::adapters::{Adapter, adapters};
 use self::buffers::{Grown, PictureBuffers};
 use self::device::Gpu as Device;
 pub use self::device::Limits;
-use self::pipelines::Pipelines;
+use self::pipelines::{Groups, Pipelines};
 use self::records::Records;
 use self::scene::SceneBuffers;
 use self::timing::Timing;
@@ -71,6 +71,8 @@ struct Ready {
     scene: Option<SceneBuffers>,
     plan: Grown,
     picture: Option<PictureBuffers>,
+    /// Of these buffers and pipelines: made when there were so many buffers.
+    groups: Option<(usize, usize, Groups)>,
     timing: Option<Timing>,
     records: Records,
     /// Entries of the pixels' lists that there is room for.
@@ -101,6 +103,14 @@ impl Gpu {
         self.ready.as_ref().map_or(0, |ready| ready.gpu.allocations.get())
     }
 
+    /// Replaces something in all shaders.
+    #[cfg(test)]
+    fn mutate(&mut self, mutant: [&'static str; 2]) {
+        if let Some(ready) = &mut self.ready {
+            ready.gpu.mutant = Some(mutant);
+        }
+    }
+
     /// Loses the device, as a driver may at any time.
     #[cfg(test)]
     fn lose(&self) {
@@ -121,6 +131,7 @@ impl Ready {
             pipelines: Vec::new(),
             scene: None,
             picture: None,
+            groups: None,
             records: Records::default(),
             capacity: FIRST_CAPACITY,
         })
@@ -242,7 +253,7 @@ impl Ready {
             }
             self.capacity = needed.saturating_add(needed / 4).min(most);
         }
-        self.read(visibility, planes, out)?;
+        self.read(visibility, out)?;
         if let Some(timing) = &self.timing {
             let [project, resolve] = timing.milliseconds(&self.gpu)?;
             (report.project_ms, report.splat_ms) = (Some(project), Some(resolve));
@@ -258,14 +269,14 @@ impl Ready {
     /// Draws and resolves; returns how many entries lists would have needed.
     fn draw(
         &mut self,
-        pipelines: usize,
+        index: usize,
         visibility: &Visibility,
         planes: bool,
         path: Path,
     ) -> Result<u32> {
         let gpu = &self.gpu;
         let size = visibility.size;
-        let pipelines = &self.pipelines[pipelines].1;
+        let pipelines = &self.pipelines[index].1;
         let lists = pipelines.shape == SplatShape::Ellipse;
         let rows = self.records.rows();
         self.plan.hold(gpu, size_of_val(rows) as u64)?;
@@ -274,19 +285,25 @@ impl Ready {
             self.picture = Some(PictureBuffers::new(gpu, size, self.capacity, lists)?);
         }
         let scene = self.scene.as_ref().expect("it was uploaded");
-        let picture = self.picture.as_mut().expect("it was made");
+        let picture = self.picture.as_ref().expect("it was made");
+        let made = (index, gpu.allocations.get());
+        if self.groups.as_ref().is_none_or(|(index, count, _)| (*index, *count) != made) {
+            let groups =
+                gpu.checked(|| pipelines.groups(gpu, scene, self.plan.buffer(), picture))?;
+            self.groups = Some((made.0, made.1, groups));
+        }
+        let groups = &self.groups.as_ref().expect("they were made").2;
         gpu.checked(|| {
             gpu.queue.write_buffer(self.plan.buffer(), 0, bytemuck::cast_slice(rows));
             let frame = self.records.frame(self.capacity);
             gpu.queue.write_buffer(&picture.frame, 0, bytemuck::bytes_of(&frame));
-            let groups = pipelines.groups(gpu, scene, self.plan.buffer(), picture);
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             encoder.clear_buffer(&picture.heads, 0, None);
             if let Some(tails) = &picture.tails {
                 encoder.clear_buffer(tails, 0, None);
             }
             let chunks = self.records.chunks();
-            pipelines.encode(&mut encoder, &groups, picture, path, chunks, self.timing.as_ref());
+            pipelines.encode(&mut encoder, groups, picture, path, chunks, self.timing.as_ref());
             if lists {
                 encoder.copy_buffer_to_buffer(&picture.heads, 0, &picture.count, 0, 4);
             }
@@ -305,7 +322,7 @@ impl Ready {
     }
 
     /// The reflection back to the CPU.
-    fn read(&self, visibility: &Visibility, planes: bool, out: &mut Reflection) -> Result<()> {
+    fn read(&self, visibility: &Visibility, out: &mut Reflection) -> Result<()> {
         let picture = self.picture.as_ref().expect("it was drawn");
         let pixels = visibility.size.pixels();
         out.radiance.resize(pixels, Vec3::ZERO);
@@ -322,7 +339,6 @@ impl Ready {
                 }
             });
         })?;
-        let _ = planes;
         Ok(())
     }
 

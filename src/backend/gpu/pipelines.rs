@@ -33,7 +33,11 @@ pub(super) struct Groups {
 }
 
 /// A binding: who sees it, and whether it is written.
-fn entry(binding: u32, stages: wgpu::ShaderStages, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEntry {
+fn entry(
+    binding: u32,
+    stages: wgpu::ShaderStages,
+    ty: wgpu::BufferBindingType,
+) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: stages,
@@ -73,6 +77,7 @@ impl Pipelines {
             entry(2, S::COMPUTE, READ),
             entry(3, S::COMPUTE, WRITE),
             entry(5, S::COMPUTE, WRITE),
+            entry(6, S::COMPUTE, READ),
             entry(7, S::COMPUTE, WRITE),
             entry(8, S::COMPUTE, WRITE),
         ];
@@ -105,12 +110,14 @@ impl Pipelines {
         let names = if lists || wide { &both[..1] } else { &both[..] };
         let projections = names.iter().map(|name| compute(&text, name, &splat_layout)).collect();
         let resolved = if lists { "blend" } else { "resolve" };
-        let resolve =
-            [false, wide].map(|wide| compute(&shaders::resolve(shape, wide), resolved, &resolve_layout));
+        let resolve = [false, wide]
+            .map(|wide| compute(&shaders::resolve(shape, wide), resolved, &resolve_layout));
         let fragments: &[&str] = if lists { &["cover"] } else { &["cover", "cover_again"] };
         let text = module(gpu, &shaders::splat(shape, true, false));
-        let vertex =
-            fragments.iter().map(|name| rendering(gpu, &text, name, shape, &splat_layout)).collect();
+        let vertex = fragments
+            .iter()
+            .map(|name| rendering(gpu, &text, name, shape, &splat_layout))
+            .collect();
         Self {
             shape,
             close: lists.then(|| compute(&shaders::close(), "close", &close_layout)),
@@ -166,7 +173,8 @@ impl Pipelines {
         let mut resolve = vec![
             (0, frame),
             (1, plan),
-            (2, &scene.radiance),
+            (2, &scene.radiance[0]),
+            (6, &scene.radiance[1]),
             (5, &picture.nearest),
             (7, &picture.heads),
             (8, second),
@@ -174,7 +182,8 @@ impl Pipelines {
         let mut close = None;
         if let Some([_, colors, layers]) = &picture.entries {
             resolve.extend([(3, colors), (4, layers)]);
-            let buffers = [(0, frame), (1, plan), (2, colors), (3, layers), (4, &picture.reflection)];
+            let buffers =
+                [(0, frame), (1, plan), (2, colors), (3, layers), (4, &picture.reflection)];
             close = Some(group(&self.close_layout, &buffers));
         } else {
             resolve.push((3, &picture.reflection));
@@ -203,13 +212,16 @@ impl Pipelines {
                 for (i, pipeline) in self.compute.iter().enumerate() {
                     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                         label: Some("project"),
-                        timestamp_writes: timing.map(|timing| wgpu::ComputePassTimestampWrites {
-                            query_set: &timing.stamps,
-                            beginning_of_pass_write_index: (i == 0).then_some(0),
-                            end_of_pass_write_index: (i + 1 == passes).then_some(1),
-                        }).filter(|w| {
-                            w.beginning_of_pass_write_index.is_some() || w.end_of_pass_write_index.is_some()
-                        }),
+                        timestamp_writes: timing
+                            .map(|timing| wgpu::ComputePassTimestampWrites {
+                                query_set: &timing.stamps,
+                                beginning_of_pass_write_index: (i == 0).then_some(0),
+                                end_of_pass_write_index: (i + 1 == passes).then_some(1),
+                            })
+                            .filter(|w| {
+                                w.beginning_of_pass_write_index.is_some()
+                                    || w.end_of_pass_write_index.is_some()
+                            }),
                     });
                     pass.set_pipeline(pipeline);
                     pass.set_bind_group(0, &groups.splat, &[]);
@@ -261,13 +273,16 @@ impl Pipelines {
                         store: wgpu::StoreOp::Discard,
                     },
                 })],
-                timestamp_writes: timing.map(|timing| wgpu::RenderPassTimestampWrites {
-                    query_set: &timing.stamps,
-                    beginning_of_pass_write_index: (i == 0).then_some(0),
-                    end_of_pass_write_index: (i + 1 == passes).then_some(1),
-                }).filter(|w| {
-                    w.beginning_of_pass_write_index.is_some() || w.end_of_pass_write_index.is_some()
-                }),
+                timestamp_writes: timing
+                    .map(|timing| wgpu::RenderPassTimestampWrites {
+                        query_set: &timing.stamps,
+                        beginning_of_pass_write_index: (i == 0).then_some(0),
+                        end_of_pass_write_index: (i + 1 == passes).then_some(1),
+                    })
+                    .filter(|w| {
+                        w.beginning_of_pass_write_index.is_some()
+                            || w.end_of_pass_write_index.is_some()
+                    }),
                 ..Default::default()
             });
             pass.set_pipeline(pipeline);
@@ -289,6 +304,11 @@ fn pipeline_layout(gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::PipelineL
 }
 
 fn module(gpu: &Gpu, text: &str) -> wgpu::ShaderModule {
+    #[cfg(test)]
+    let text = match gpu.mutant {
+        Some([from, to]) => &text.replace(from, to),
+        None => text,
+    };
     gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: None,
         source: wgpu::ShaderSource::Wgsl(text.into()),

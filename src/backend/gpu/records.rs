@@ -147,7 +147,8 @@ impl Records {
         frame.chunks = index(rows.len());
         for list in [|p: &Part| &p.single, |p: &Part| &p.several] as [fn(&Part) -> &Vec<Row>; 2] {
             for (part, first) in parts.iter().zip(&firsts) {
-                let moved = |&[camera, from, to, begin]: &Row| [camera, from + first, to + first, begin];
+                let moved =
+                    |&[camera, from, to, begin]: &Row| [camera, from + first, to + first, begin];
                 rows.extend(list(part).iter().map(moved));
             }
         }
@@ -218,7 +219,8 @@ impl Part {
         for batch in list.iter().filter(|b| (b.roots > 1) == several) {
             let own = index(self.batches.len() / 2);
             // The last chunk has it too, and those that begin in it.
-            if let Some(last) = chunks.last_mut().filter(|c| c[0] == camera && count < c[3] + CHUNK) {
+            if let Some(last) = chunks.last_mut().filter(|c| c[0] == camera && count < c[3] + CHUNK)
+            {
                 last[2] = own + 1;
             }
             let end = count + batch.count;

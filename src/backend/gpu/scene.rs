@@ -15,8 +15,8 @@ pub(super) struct SceneBuffers {
     pub(super) place: [wgpu::Buffer; 4],
     /// Two halves of an octahedron's net.
     pub(super) normals: wgpu::Buffer,
-    /// Three numbers of nine bits and their exponent.
-    pub(super) radiance: wgpu::Buffer,
+    /// Red and green as halves, and blue: in two lists, which are as long as a binding may be.
+    pub(super) radiance: [wgpu::Buffer; 2],
 }
 
 /// Surfels packed and sent at a time: that bounds the memory besides theirs.
@@ -49,7 +49,13 @@ impl SceneBuffers {
                 numbers(&surfels.extent)?,
             ],
             normals: words(&|i| packed_normal(surfels.normals[i]))?,
-            radiance: words(&|i| packed_radiance(surfels.radiance[i]))?,
+            radiance: [
+                words(&|i| {
+                    let [r, g, _] = surfels.radiance[i].to_array();
+                    packed_half(r) | packed_half(g) << 16
+                })?,
+                words(&|i| surfels.radiance[i].z.to_bits())?,
+            ],
         })
     }
 }
@@ -89,25 +95,18 @@ pub(super) fn packed_normal(n: Vec3) -> u32 {
     half(folded.x) | half(folded.y) << 16
 }
 
-/// Bits of a mantissa, and what their exponent is counted from.
-const MANTISSA: i32 = 9;
-const BIAS: i32 = 15;
-
-/// Radiance with one exponent for all three; what is negative or no number is black.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "few bits")]
-pub(super) fn packed_radiance(radiance: Vec3) -> u32 {
-    const MOST: f32 = 65408.0; // 511/512 · 2^16
-    let c = radiance.to_array().map(|v| if v > 0.0 { v.min(MOST) } else { 0.0 });
-    let most = c[0].max(c[1]).max(c[2]);
-    if most == 0.0 {
-        return 0;
+/// The nearest half (IEEE 754 binary16); what is negative or no number is 0, what is too large the largest.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "16 bits")]
+pub(super) fn packed_half(value: f32) -> u32 {
+    const MOST: f32 = 65504.0;
+    const LEAST_NORMAL: f32 = 6.103_515_6e-5; // 2^-14
+    let v = if value > 0.0 { value.min(MOST) } else { 0.0 };
+    if v < LEAST_NORMAL {
+        // Multiples of 2^-24.
+        return (v * 16_777_216.0).round() as u32;
     }
-    // The power of two above the largest.
-    let mut exponent = ((most.to_bits() >> 23) as i32 - 126).max(-BIAS);
-    let scaled = |v: f32, exponent: i32| (v * f32::powi(2.0, MANTISSA - exponent)).round() as u32;
-    if scaled(most, exponent) > 511 {
-        exponent += 1;
-    }
-    let [r, g, b] = c.map(|v| scaled(v, exponent));
-    r | g << 9 | b << 18 | ((exponent + BIAS) as u32) << 27
+    // To even, at the 13 bits that a half has not.
+    let bits = v.to_bits();
+    let rounded = bits + 0xfff + (bits >> 13 & 1);
+    ((rounded >> 13) - (112 << 10)).min(0x7bff)
 }

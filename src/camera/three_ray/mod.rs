@@ -9,7 +9,7 @@ mod paper_test;
 pub mod project;
 pub mod solve;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 pub mod volume;
 
 use glam::DVec3;

@@ -9,10 +9,10 @@ use super::*;
 use crate::geometry::lanes::{Real, Vector};
 
 /// SplitMix64 as numbers in 0..1.
-struct Numbers(u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -20,16 +20,16 @@ impl Numbers {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn between(&mut self, lo: f64, hi: f64) -> f64 {
+    pub(crate) fn between(&mut self, lo: f64, hi: f64) -> f64 {
         lo + (hi - lo) * self.next()
     }
 
-    fn point(&mut self) -> DVec3 {
+    pub(crate) fn point(&mut self) -> DVec3 {
         DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
     }
 
     /// A triangle of a paraboloid z = -(k1 x² + k2 y²)/2 with edges of about `edge`, seen from above.
-    fn camera(&mut self, edge: f64, scale: RayScale) -> Rays {
+    pub(crate) fn camera(&mut self, edge: f64, scale: RayScale) -> Rays {
         let (k1, k2) = (self.between(-1.0, 1.0), self.between(-1.0, 1.0));
         let eye =
             DVec3::new(self.between(-2.0, 2.0), self.between(-2.0, 2.0), self.between(1.0, 4.0));
@@ -47,7 +47,7 @@ impl Numbers {
         Rays { origins: rays.map(|r| r.0), directions: rays.map(|r| r.1) }
     }
 
-    fn weights(&mut self) -> DVec3 {
+    pub(crate) fn weights(&mut self) -> DVec3 {
         let (mut b, mut c) = (self.next(), self.next());
         if b + c > 1.0 {
             (b, c) = (1.0 - b, 1.0 - c);
