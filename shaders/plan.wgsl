@@ -17,7 +17,8 @@ struct Frame {
     push_back: u32,
     first_root: u32,
     chunk_count: u32,
-    padding: u32,
+    /// Whether points with an image are counted.
+    counts: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -99,6 +99,7 @@ fn built_in_scene(cx: &Context) -> anyhow::Result<()> {
             backend: "auto".into(),
             adapter: None,
             gpu_path: "compute".into(),
+            stats: false,
             preset: None,
             quality: "default".into(),
         },

@@ -12,10 +12,14 @@ fn project_lane(group: vec3<u32>, lane: u32, again: bool) {
     let place = vec3(surfel_x[job.surfel], surfel_y[job.surfel], surfel_z[job.surfel]);
     let q = place - row(job.camera + V1).xyz;
     let images = images_of(job.camera, q, job.lambda);
+    var valid = false;
     for (var piece = 0u; piece < images.pieces.count; piece++) {
         let image = project(job.camera, images, piece);
         if !image.found {
             continue;
+        }
+        if frame.counts != 0u && !again {
+            valid = valid || is_valid(job.camera, image);
         }
         let s = splat_of(job, image);
         if s.drawn {
@@ -24,6 +28,9 @@ fn project_lane(group: vec3<u32>, lane: u32, again: bool) {
         if frame.first_root != 0u && is_seen(job.camera, image) {
             break;
         }
+    }
+    if valid {
+        count_valid();
     }
 }
 

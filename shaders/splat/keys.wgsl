@@ -18,6 +18,11 @@ fn put_tail(pixel: u32, head: u32, surfel: u32) {
     }
 }
 
+/// One more point has an image.
+fn count_valid() {
+    atomicAdd(&tails[frame.size.x * frame.size.y], 1u);
+}
+
 fn put(pixel: u32, head: u32, surfel: u32, again: bool) {
     if again {
         put_tail(pixel, head, surfel);

@@ -4,6 +4,11 @@
 /// The next entry, depth, share of the pixel and reach in depth (two halves), surfel. Entry 0 is not used.
 @group(0) @binding(8) var<storage, read_write> entries: array<vec4<u32>>;
 
+/// One more point has an image.
+fn count_valid() {
+    atomicAdd(&heads[frame.size.x * frame.size.y + 1u], 1u);
+}
+
 /// The part of a pixel that a splat covers, at `d` pixels from its middle.
 fn part_at(d: vec2<f32>, form: vec3<f32>, weight: f32) -> f32 {
     let inside = max(1.0 - (d.x * (d.x * form.x + 2.0 * form.y * d.y) + form.z * d.y * d.y), 0.0);

@@ -120,6 +120,20 @@ fn is_seen(camera: u32, image: Image) -> bool {
     return within(image, row(camera + GUARD).xyz) && 0.0 < linear(image, row(camera + FRONT).xyz);
 }
 
+/// Whether the image lies in the camera's triangle, or its cell's rectangle.
+fn is_valid(camera: u32, image: Image) -> bool {
+    let owner = frame.patches + 2u * plan[camera + IDS].x;
+    if plan[owner + 1u].x == 0u {
+        return within(image, vec3(EDGE_TOLERANCE)) && is_seen(camera, image);
+    }
+    let w = linear(image, row(camera + SCREEN + 2u).xyz);
+    if !is_seen(camera, image) || !(0.0 < w) {
+        return false;
+    }
+    let at = vec2(linear(image, row(camera + SCREEN).xyz), linear(image, row(camera + SCREEN + 1u).xyz)) / w;
+    return all(at >= vec2(0.0)) && all(at < vec2<f32>(plan[owner].zw));
+}
+
 /// What an image draws into its patch's tile, if anything.
 fn splat_of(job: Job, image: Image) -> Splat {
     var s: Splat;

@@ -14,6 +14,7 @@ use crate::visibility::Visibility;
 pub fn fastest(has_shaders: bool) -> Box<dyn Backend> {
     #[cfg(feature = "gpu")]
     if has_shaders
+        && gpu::may_be_there()
         && gpu::adapters().first().is_some_and(|adapter| !adapter.software)
         && let Ok(gpu) = gpu::Gpu::new(gpu::Options::default())
     {

@@ -62,8 +62,8 @@ pub(crate) fn layer(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> any
     let info = rays.info().param("mirror-occlusion");
     rays_params.set(info, params.choice(info.id))?;
     let ready = args.scene.ready(leaf, cx)?;
-    let mut a = Side::new(&ready, method, params, cx)?;
-    let mut b = Side::new(&ready, rays, rays_params, cx)?;
+    let mut a = Side::new(&ready, args.how.renderer(method)?, method, params, cx)?;
+    let mut b = Side::new(&ready, Renderer::new(), rays, rays_params, cx)?;
     let (mut layers, mut traced, mut ratios, mut reports) = (vec![], vec![], vec![], vec![]);
     for i in 0..args.repeat + WARM_UP {
         cx.step("measuring", f64::from(i) / f64::from(args.repeat + WARM_UP))?;
@@ -114,13 +114,13 @@ struct Side {
 impl Side {
     fn new(
         ready: &Ready,
+        mut renderer: Renderer,
         method: &'static dyn Method,
         params: Params,
         cx: &Context,
     ) -> anyhow::Result<Self> {
         method.qualify(&ready.scene, &params)?;
         let made = method.prepare(&ready.scene, &params, cx)?;
-        let mut renderer = Renderer::new();
         renderer.see(&ready.scene, &ready.eye);
         Ok(Self { renderer, method, params, made })
     }

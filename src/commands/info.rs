@@ -14,6 +14,9 @@ use super::{SceneArgs, check_json, ms, say, write_json};
 pub(crate) struct InfoArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    /// List this machine's graphics adapters instead: names, limits and features
+    #[arg(long)]
+    adapters: bool,
     /// Write the figures as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -21,6 +24,9 @@ pub(crate) struct InfoArgs {
 
 pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
     check_json(args.json.as_ref())?;
+    if args.adapters {
+        return adapters(args);
+    }
     let ready = args.scene.ready(None, cx)?;
     let scene = &ready.scene;
     say!("{}: {} surfels", scene.name, scene.surfel_count());
@@ -86,4 +92,52 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
         },
     });
     write_json(args.json.as_ref(), &value)
+}
+
+#[cfg(feature = "gpu")]
+fn adapters(args: &InfoArgs) -> anyhow::Result<()> {
+    let list = catoptric::backend::gpu::adapters();
+    if list.is_empty() {
+        say!("no graphics adapter was found: --backend cpu draws everything");
+    }
+    for (i, a) in list.iter().enumerate() {
+        say!("{i} {} ({}{})", a.name, a.api, if a.software { ", software" } else { "" });
+        say!("  driver {}", a.driver);
+        say!(
+            "  storage binding {} MB, {} storage buffers a stage, pictures up to {} pixels a side",
+            a.binding_bytes / 1_000_000,
+            a.storage_buffers,
+            a.picture_px
+        );
+        say!("  timestamps: {}, 64-bit atomics: {}", yes(a.timestamps), yes(a.atomics_64));
+    }
+    let list: Vec<_> = list
+        .iter()
+        .map(|a| {
+            json!({
+                "name": a.name,
+                "api": a.api,
+                "driver": a.driver,
+                "software": a.software,
+                "binding_bytes": a.binding_bytes,
+                "storage_buffers": a.storage_buffers,
+                "picture_px": a.picture_px,
+                "timestamps": a.timestamps,
+                "atomics_64": a.atomics_64,
+            })
+        })
+        .collect();
+    write_json(args.json.as_ref(), &json!({ "adapters": list }))
+}
+
+#[cfg(feature = "gpu")]
+fn yes(is: bool) -> &'static str {
+    if is { "yes" } else { "no" }
+}
+
+#[cfg(not(feature = "gpu"))]
+fn adapters(_args: &InfoArgs) -> anyhow::Result<()> {
+    let problem = "this program was built without the feature gpu";
+    let remedy = "build it with --features gpu";
+    Err(catoptric::Error::input("--adapters", "", problem, remedy).into())
 }

@@ -68,6 +68,9 @@ pub(crate) struct HowArgs {
     /// Where the GPU projects: in compute shaders, or in a vertex shader as in the paper
     #[arg(long, value_name = "PATH", default_value = "compute", value_parser = ["compute", "vertex"])]
     pub(crate) gpu_path: String,
+    /// Count also what costs time to count: on the GPU, the points with an image (compute path)
+    #[arg(long)]
+    pub(crate) stats: bool,
     /// Named set of parameters (paper: everything as Mei et al. had it)
     #[arg(long, value_name = "NAME")]
     pub(crate) preset: Option<String>,
@@ -101,7 +104,12 @@ impl HowArgs {
             "vertex" => gpu::Path::Vertex,
             _ => gpu::Path::Compute,
         };
-        let options = gpu::Options { adapter: self.adapter.clone(), path, ..Default::default() };
+        let options = gpu::Options {
+            adapter: self.adapter.clone(),
+            path,
+            stats: self.stats,
+            ..Default::default()
+        };
         Ok(Box::new(gpu::Gpu::new(options)?))
     }
 
@@ -267,13 +275,12 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
         ready.scene.mirror_triangle_count(),
         report.mirror_pixels
     );
-    if let (Some(cameras), Some(batches), Some(projections), Some(share)) =
-        (report.cameras, report.batches, report.projections, report.valid_share())
+    if let (Some(cameras), Some(batches), Some(projections)) =
+        (report.cameras, report.batches, report.projections)
     {
-        say!(
-            "  {cameras} cameras, {batches} batches, {projections} projections, {:.1} % valid",
-            share * 100.0
-        );
+        let share = report.valid_share();
+        let valid = share.map_or(String::new(), |share| format!(", {:.1} % valid", share * 100.0));
+        say!("  {cameras} cameras, {batches} batches, {projections} projections{valid}");
     }
     let stages = [
         ("visibility", report.ids_ms),

@@ -4,6 +4,8 @@
 
 mod bad_files;
 mod bad_options;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod interrupt;
 mod runs;
 mod same_bytes;
@@ -60,6 +62,8 @@ impl Folder {
     fn command(&self, words: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_catoptric"));
         command.args(words).current_dir(self.0.path());
+        // Without it some Vulkan drivers complain on standard error.
+        command.env("XDG_RUNTIME_DIR", self.0.path());
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }

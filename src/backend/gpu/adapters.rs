@@ -60,6 +60,12 @@ fn described(adapter: &wgpu::Adapter) -> Adapter {
     }
 }
 
+/// Whether there may be a graphics card: loading drivers to find none takes longer than a small picture.
+pub fn may_be_there() -> bool {
+    const DEVICES: [&str; 4] = ["/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/kfd"];
+    !cfg!(target_os = "linux") || DEVICES.iter().any(|path| std::path::Path::new(path).exists())
+}
+
 /// All adapters, the best first.
 pub fn adapters() -> Vec<Adapter> {
     list(&instance()).iter().map(described).collect()

@@ -88,7 +88,7 @@ impl PictureBuffers {
             heads,
             tails: match lists {
                 true => None,
-                false => Some(gpu.buffer("pixels", pixels * 4, own | U::COPY_DST)?),
+                false => Some(gpu.buffer("pixels", pixels * 4 + 4, own | U::COPY_DST)?),
             },
             entries: match lists {
                 true => Some([

@@ -19,7 +19,7 @@ use std::time::Instant;
 
 use glam::{Vec3, Vec4};
 
-pub use self::adapters::{Adapter, adapters};
+pub use self::adapters::{Adapter, adapters, may_be_there};
 use self::buffers::{Grown, PictureBuffers};
 use self::device::Gpu as Device;
 pub use self::device::Limits;
@@ -55,6 +55,8 @@ pub struct Options {
     pub path: Path,
     /// See [`Limits`].
     pub limits: Limits,
+    /// Count the points with an image, on the compute path; that costs time.
+    pub stats: bool,
 }
 
 /// The backend; keeps everything on the device between frames.
@@ -157,7 +159,7 @@ impl Backend for Gpu {
                 Some(ready) => ready,
                 none => none.insert(Ready::new(&self.options)?),
             };
-            let done = ready.execute(plan, scene, visibility, planes, self.options.path, out);
+            let done = ready.execute(plan, scene, visibility, planes, &self.options, out);
             let lost = ready.gpu.is_lost();
             if lost {
                 // Everything on it is gone.
@@ -178,7 +180,7 @@ impl Ready {
         scene: &PreparedScene,
         visibility: &Visibility,
         planes: bool,
-        path: Path,
+        options: &Options,
         out: &mut Reflection,
     ) -> Result<ExecuteReport> {
         let size = visibility.size;
@@ -192,7 +194,7 @@ impl Ready {
         for pass in &plan.passes {
             match pass {
                 Pass::Splat(pass) => {
-                    report = self.splat(pass, scene, visibility, planes, path, out)?;
+                    report = self.splat(pass, scene, visibility, planes, options, out)?;
                 }
                 // Splats are resolved where they are drawn.
                 Pass::Resolve => {}
@@ -215,7 +217,7 @@ impl Ready {
         scene: &PreparedScene,
         visibility: &Visibility,
         planes: bool,
-        path: Path,
+        options: &Options,
         out: &mut Reflection,
     ) -> Result<ExecuteReport> {
         let version = scene.surfel_version;
@@ -234,8 +236,9 @@ impl Ready {
             }
         };
         loop {
-            let needed = self.draw(pipelines, visibility, planes, path)?;
+            let (needed, valid) = self.draw(pipelines, visibility, planes, options)?;
             if needed <= self.capacity {
+                report.valid = valid.map(u64::from);
                 break;
             }
             // More splats than there was room for: once more, with room.
@@ -266,14 +269,15 @@ impl Ready {
         Ok(report)
     }
 
-    /// Draws and resolves; returns how many entries lists would have needed.
+    /// Draws and resolves; returns how many entries lists would have needed, and how many points have an image if that is
+    /// counted.
     fn draw(
         &mut self,
         index: usize,
         visibility: &Visibility,
         planes: bool,
-        path: Path,
-    ) -> Result<u32> {
+        options: &Options,
+    ) -> Result<(u32, Option<u32>)> {
         let gpu = &self.gpu;
         let size = visibility.size;
         let pipelines = &self.pipelines[index].1;
@@ -292,10 +296,12 @@ impl Ready {
                 gpu.checked(|| pipelines.groups(gpu, scene, self.plan.buffer(), picture))?;
             self.groups = Some((made.0, made.1, groups));
         }
+        let counts = options.stats && options.path == Path::Compute;
+        let path = options.path;
         let groups = &self.groups.as_ref().expect("they were made").2;
         gpu.checked(|| {
             gpu.queue.write_buffer(self.plan.buffer(), 0, bytemuck::cast_slice(rows));
-            let frame = self.records.frame(self.capacity);
+            let frame = self.records.frame(self.capacity, counts);
             gpu.queue.write_buffer(&picture.frame, 0, bytemuck::bytes_of(&frame));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             encoder.clear_buffer(&picture.heads, 0, None);
@@ -304,21 +310,23 @@ impl Ready {
             }
             let chunks = self.records.chunks();
             pipelines.encode(&mut encoder, groups, picture, path, chunks, self.timing.as_ref());
-            if lists {
-                encoder.copy_buffer_to_buffer(&picture.heads, 0, &picture.count, 0, 4);
-            }
+            let pixels = size.pixels() as u64;
+            let (from, at) = match &picture.tails {
+                Some(tails) => (tails, pixels * 4),
+                None => (&picture.heads, pixels * 4 + 4),
+            };
+            encoder.copy_buffer_to_buffer(&picture.heads, 0, &picture.count, 0, 4);
+            encoder.copy_buffer_to_buffer(from, at, &picture.count, 4, 4);
             picture.copy_out(&mut encoder, planes);
             if let Some(timing) = &self.timing {
                 timing.copy_out(&mut encoder);
             }
             gpu.queue.submit([encoder.finish()]);
         })?;
-        if !lists {
-            return Ok(0);
-        }
-        let count = gpu.read::<u32, u32>(&picture.count, 4, |count| count[0])?;
-        // The first one is not used.
-        Ok(count.saturating_add(1))
+        let [count, valid] = gpu.read::<u32, _>(&picture.count, 8, |count| [count[0], count[1]])?;
+        // The first entry is not used.
+        let needed = if lists { count.saturating_add(1) } else { 0 };
+        Ok((needed, counts.then_some(valid)))
     }
 
     /// The reflection back to the CPU.

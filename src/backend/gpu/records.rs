@@ -62,7 +62,8 @@ pub(super) struct Frame {
     pub(super) push_back: u32,
     pub(super) first_root: u32,
     pub(super) chunk_count: u32,
-    pub(super) padding: [u32; 3],
+    pub(super) counts: u32,
+    pub(super) padding: [u32; 2],
 }
 
 /// Chunks whose surfels have one image at most, and the others behind them.
@@ -186,8 +187,8 @@ impl Records {
         self.chunks
     }
 
-    pub(super) fn frame(&self, capacity: u32) -> Frame {
-        Frame { capacity, ..self.frame }
+    pub(super) fn frame(&self, capacity: u32, counts: bool) -> Frame {
+        Frame { capacity, counts: u32::from(counts), ..self.frame }
     }
 }
 

@@ -81,7 +81,7 @@ fn send<T: bytemuck::Pod>(
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "16 bits")]
 pub(super) fn packed_normal(n: Vec3) -> u32 {
     let sum = n.abs().element_sum();
-    if !(sum > 0.0) {
+    if sum.is_nan() || sum <= 0.0 {
         return 0;
     }
     let p = Vec2::new(n.x, n.y) / sum;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::records::{LAYOUT, NO_OWNER};
-use crate::backend::cpu::splat::{blend, projection};
+use crate::backend::cpu::splat::{EDGE_TOLERANCE, blend, projection};
 use crate::camera::three_ray::solve::MAX_STEPS;
 use crate::geometry::lanes::Scalar;
 use crate::plan::{CELL_SLACK_PX, LARGEST_ELLIPSE, SplatShape};
@@ -59,6 +59,7 @@ fn constants(shape: SplatShape) -> String {
     let numbers = [
         ("ROOT_EPSILON", epsilon),
         ("REACH", shape.reach()),
+        ("EDGE_TOLERANCE", EDGE_TOLERANCE),
         ("LARGEST_ELLIPSE", LARGEST_ELLIPSE),
         ("CELL_SLACK_PX", CELL_SLACK_PX),
         ("SPREAD", projection::SPREAD),

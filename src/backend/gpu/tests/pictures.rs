@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use super::super::buffers::PictureBuffers;
+use super::super::device::Gpu as Device;
 use super::super::{Gpu, Limits, Options, Path};
 use super::device;
 use crate::backend::{Backend, cpu::Cpu};
@@ -250,7 +252,7 @@ fn frames_make_no_buffers_and_a_lost_device_is_replaced() {
     assert!((run(&mut backend) - first).abs() < 1e-2, "after the device was lost");
 }
 
-fn seen(scene: &PreparedScene) -> crate::visibility::Visibility {
+pub(super) fn seen(scene: &PreparedScene) -> crate::visibility::Visibility {
     use crate::backend::cpu::finish;
     let mut visibility = crate::visibility::Visibility::default();
     let (mirrors, objects) = (finish::mirror_surfaces(scene), finish::object_surfaces(scene));
@@ -266,6 +268,10 @@ fn bad_wishes_are_refused() {
     if device().is_none() {
         return;
     }
+    let core = Device::open(None, Limits::Core).expect("it was opened before");
+    let large = ImageSize { width: 16384, height: 16384 };
+    let error = PictureBuffers::new(&core, large, 16, true).err().expect("too large").to_string();
+    assert!(error.contains("in one piece") && error.contains("--backend cpu"), "{error}");
     assert!(Gpu::new(named("99")).is_err());
     assert!(Gpu::new(named("0")).is_ok());
     let mut backend = gpu(Path::Compute, Limits::Adapter);
