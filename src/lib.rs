@@ -58,7 +58,7 @@
 //! | [`plan`] | a frame as data: passes, cameras, batches | geometry, camera, scene, visibility, image |
 //! | [`cull`] | (trees, camera) → batches | geometry, camera, accel, scene, plan |
 //! | [`methods`] | the registry: a method is one file | all above |
-//! | [`backend`] | executes plans | all above but cull and methods |
+//! | [`backend`] | executes plans, on the CPU or through wgpu (shaders in `shaders/`) | all above but cull and methods |
 //! | [`frame`] | one frame from end to end | all above |
 //!
 //! Everything may use [`error`] and [`context`]. `tests/architecture.rs` holds the table.
@@ -112,7 +112,9 @@
 //!   what is left. Where a pixel sees a whole room, the nearest of all would be wrong.
 //! - Depth is the distance from the mirror along the ray, behind a pre-pass that says which mirror triangle
 //!   a pixel shows. The paper's distance from the eye can let a hidden mirror's reflection win.
-//! - The numeric kernels are written once, over lanes, without fused or approximate operations.
+//! - The numeric kernels are written once, over lanes, without fused or approximate operations; their only twins are
+//!   the files in `shaders/`. On the GPU every pixel has a list of the ellipses that cover it and takes the nearest
+//!   itself: nothing is sorted.
 //!
 //! # Sources
 //!
