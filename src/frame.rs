@@ -207,7 +207,7 @@ impl Renderer {
     /// The last stage: environment, tint, direct view.
     fn compose(&mut self, scene: &PreparedScene, eye: &Eye) {
         let (reflection, picture) = (&mut self.reflection, &mut self.picture);
-        finish::finish(scene, eye, &self.visibility, reflection, self.white, picture);
+        self.backend.compose(scene, eye, &self.visibility, reflection, self.white, picture);
     }
 
     /// The picture of the last frame, linear RGB.

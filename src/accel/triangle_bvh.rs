@@ -141,6 +141,14 @@ impl TriangleBvh {
         Self { tree, triangles: in_order, ids, scale, bounds, root }
     }
 
+    /// The tree's nodes, its triangles (corner 0, corner 0 - corner 1, corner 2 - corner 0) and its units per scene unit.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn parts(&self) -> (&[obvhs::cwbvh::node::CwBvhNode], Vec<[[f32; 4]; 3]>, f32) {
+        let four = |v: Vec3A| v.extend(0.0).to_array();
+        let triangles = self.triangles.par_iter().map(|t| [four(t.v0), four(t.e1), four(t.e2)]);
+        (&self.tree.nodes, triangles.collect(), self.scale)
+    }
+
     /// Tight box of the triangles, scene space; empty if there are none.
     pub fn bounds(&self) -> Aabb {
         self.bounds

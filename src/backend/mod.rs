@@ -4,7 +4,9 @@ pub mod cpu;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 
+use crate::camera::Eye;
 use crate::error::Result;
+use crate::image::Picture;
 use crate::plan::{Plan, Reflection};
 use crate::scene::prepared::PreparedScene;
 use crate::visibility::Visibility;
@@ -70,4 +72,18 @@ pub trait Backend: Send {
         planes: bool,
         out: &mut Reflection,
     ) -> Result<ExecuteReport>;
+
+    /// Completes the reflection that was executed last (environment, tint; its planes' radiance, where there are planes)
+    /// and draws what the eye sees. `white`: see [`cpu::direct::DirectView::white`].
+    fn compose(
+        &mut self,
+        scene: &PreparedScene,
+        eye: &Eye,
+        visibility: &Visibility,
+        reflection: &mut Reflection,
+        white: f32,
+        picture: &mut Picture,
+    ) {
+        cpu::finish::finish(scene, eye, visibility, reflection, white, picture);
+    }
 }

@@ -5,14 +5,14 @@ use glam::Vec3;
 use super::description::{Environment, Light};
 
 /// Half the height of the band in which the sky turns into the ground, as y of a unit direction.
-const HORIZON_BLUR: f32 = 0.015;
+pub(crate) const HORIZON_BLUR: f32 = 0.015;
 
 /// Cosines of the angles (1.6° and 1.2°) between which the sun's disc fades in. Three times as wide as the real
 /// one, so that its reflection in a curved mirror still covers a pixel.
-const SUN_EDGE: [f32; 2] = [0.999_61, 0.999_78];
+pub(crate) const SUN_EDGE: [f32; 2] = [0.999_61, 0.999_78];
 
 /// Radiance of the disc in units of the sun's irradiance. The real ratio, 15,000, would only make noise.
-const SUN_DISC: f32 = 60.0;
+pub(crate) const SUN_DISC: f32 = 60.0;
 
 impl Environment {
     /// Radiance (linear RGB, unbounded) from a unit `direction` in world axes; +y is up.

@@ -191,8 +191,16 @@ pub struct PreparedScene {
     pub times: PrepareTimes,
     /// Another number for other surfels or other light on them, over all scenes of the program.
     pub surfel_version: u64,
+    /// Another number for other places of objects, likewise.
+    pub placement_version: u64,
     /// How many trees were built since this scene was prepared: moving objects builds none.
     pub tree_builds: usize,
+}
+
+/// A number that no other scene of the program has had.
+fn another_version() -> u64 {
+    static VERSIONS: AtomicU64 = AtomicU64::new(1);
+    VERSIONS.fetch_add(1, Ordering::Relaxed)
 }
 
 impl PreparedScene {
@@ -282,6 +290,7 @@ impl PreparedScene {
             light: scene.light,
             times,
             surfel_version: 0,
+            placement_version: 0,
         };
         let corners: Vec<[Vec3; 3]> = prepared
             .mirrors
@@ -315,6 +324,7 @@ impl PreparedScene {
     /// Moves an object (object space to world). Its surfels and tree stay as they are; call
     /// [`PreparedScene::shade`] when light and shadows should follow.
     pub fn place(&mut self, object: usize, transform: &Similarity) {
+        self.placement_version = another_version();
         let to_scene = from_origin(transform, self.origin);
         self.clouds[object].place(to_scene);
         let object = &mut self.objects[object];
@@ -350,8 +360,9 @@ impl PreparedScene {
 
     /// Gives the representatives the colours of what they stand for.
     fn average(&mut self) {
-        static VERSIONS: AtomicU64 = AtomicU64::new(1);
-        self.surfel_version = VERSIONS.fetch_add(1, Ordering::Relaxed);
+        self.surfel_version = another_version();
+        // Shadows are cast from where objects are now.
+        self.placement_version = another_version();
         for cloud in &self.clouds[..self.objects.len()] {
             cloud.tree.average(&mut self.surfels.radiance, cloud.surfels.start as usize);
             cloud.tree.average(&mut self.surfels.albedo, cloud.surfels.start as usize);

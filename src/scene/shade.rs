@@ -87,7 +87,7 @@ pub struct Sun<'a> {
     occluders: &'a TriangleBvh,
     to_sun: Vec3,
     /// Distance that rounding cannot bridge, scene units.
-    apart: f32,
+    pub(crate) apart: f32,
 }
 
 /// Rounding of positions in units of the scene's size, with a margin of ten.
@@ -98,13 +98,13 @@ const LIFT: f32 = 0.1;
 
 /// A smooth surface made of flat triangles shadows itself by mistake only where the sun stands lower over it than
 /// this (as n·l): the normal of an eight-sided cylinder turns by less within a side.
-const TERMINATOR: f32 = 0.5;
+pub(crate) const TERMINATOR: f32 = 0.5;
 
 /// The surface itself is at most this number of triangles away.
-const NEIGHBORHOOD: f32 = 2.0;
+pub(crate) const NEIGHBORHOOD: f32 = 2.0;
 
 /// Triangles that may be passed on the way out of the surface itself.
-const PASSES: usize = 8;
+pub(crate) const PASSES: usize = 8;
 
 impl<'a> Sun<'a> {
     /// The light's sun behind these occluders.

@@ -112,6 +112,11 @@ impl Visibility {
         raster::draw(eye, mirrors, objects, scratch, self);
     }
 
+    /// The first id of each surface, mirrors first; behind them the number of all triangles.
+    pub fn first_ids(&self) -> &[u32] {
+        &self.first_ids
+    }
+
     /// How many surfaces are mirrors: surfaces 0 to this.
     pub fn mirrors(&self) -> usize {
         self.mirrors

@@ -7,6 +7,7 @@
 mod adapters;
 mod buffers;
 mod device;
+mod look;
 mod pipelines;
 mod records;
 mod scene;
@@ -23,15 +24,18 @@ pub use self::adapters::{Adapter, adapters, may_be_there};
 use self::buffers::{Grown, PictureBuffers};
 use self::device::Gpu as Device;
 pub use self::device::Limits;
+use self::look::Composer;
 use self::pipelines::{Groups, Pipelines};
 use self::records::Records;
 use self::scene::SceneBuffers;
 use self::timing::Timing;
+use super::cpu::finish::finish;
 use super::cpu::planes::{mark_mirrors, splat_planes};
 use super::cpu::splat::{EMPTY, Landed};
 use super::{Backend, ExecuteReport};
+use crate::camera::Eye;
 use crate::error::{Error, Result};
-use crate::image::Planes;
+use crate::image::{Picture, Planes};
 use crate::plan::{Pass, Plan, Reflection, SplatPass, SplatShape};
 use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::Visibility;
@@ -76,6 +80,9 @@ struct Ready {
     /// Of these buffers and pipelines: made when there were so many buffers.
     groups: Option<(usize, usize, Groups)>,
     timing: Option<Timing>,
+    composer: Option<Composer>,
+    /// The device cannot compose this scene: its placement.
+    composed_elsewhere: Option<u64>,
     records: Records,
     /// Entries of the pixels' lists that there is room for.
     capacity: u32,
@@ -134,6 +141,8 @@ impl Ready {
             scene: None,
             picture: None,
             groups: None,
+            composer: None,
+            composed_elsewhere: None,
             records: Records::default(),
             capacity: FIRST_CAPACITY,
         })
@@ -170,6 +179,23 @@ impl Backend for Gpu {
             }
         }
         unreachable!("the second try returns")
+    }
+
+    fn compose(
+        &mut self,
+        scene: &PreparedScene,
+        eye: &Eye,
+        visibility: &Visibility,
+        reflection: &mut Reflection,
+        white: f32,
+        picture: &mut Picture,
+    ) {
+        let ready = self.ready.as_mut();
+        let done = ready.map(|r| r.compose(scene, eye, visibility, reflection, white, picture));
+        if !matches!(done, Some(Ok(()))) {
+            // Too large for the device, or that is gone: the reflection is here.
+            finish(scene, eye, visibility, reflection, white, picture);
+        }
     }
 }
 
@@ -327,6 +353,37 @@ impl Ready {
         // The first entry is not used.
         let needed = if lists { count.saturating_add(1) } else { 0 };
         Ok((needed, counts.then_some(valid)))
+    }
+
+    fn compose(
+        &mut self,
+        scene: &PreparedScene,
+        eye: &Eye,
+        visibility: &Visibility,
+        reflection: &mut Reflection,
+        white: f32,
+        picture: &mut Picture,
+    ) -> Result<()> {
+        let gpu = &self.gpu;
+        let refused = || Error::input("--backend gpu", "", "this scene is too large", "");
+        let own = self.picture.as_ref().filter(|p| p.size() == visibility.size);
+        let own = own.ok_or_else(refused)?;
+        if self.composed_elsewhere == Some(scene.placement_version) {
+            return Err(refused());
+        }
+        let composer = match &mut self.composer {
+            Some(composer) => composer,
+            none => none.insert(Composer::new(gpu)?),
+        };
+        let mirrors = reflection.planes.is_some().then_some(&mut reflection.radiance);
+        let done =
+            composer.compose(gpu, scene, eye, visibility, &own.reflection, white, mirrors, picture);
+        if done.is_err() {
+            self.composed_elsewhere = Some(scene.placement_version);
+        } else if let Some(planes) = &mut reflection.planes {
+            planes.radiance = reflection.radiance.iter().map(|c| c.to_array()).collect();
+        }
+        done
     }
 
     /// The reflection back to the CPU.

@@ -95,16 +95,7 @@ impl Pipelines {
                 entry(4, S::COMPUTE, WRITE),
             ],
         );
-        let compute = |text: &str, name: &str, layout: &wgpu::BindGroupLayout| {
-            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(name),
-                layout: Some(&pipeline_layout(gpu, layout)),
-                module: &module(gpu, text),
-                entry_point: Some(name),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                cache: None,
-            })
-        };
+        let compute = |text: &str, name: &str, layout| compute(gpu, text, name, Some(layout));
         let text = shaders::splat(shape, false, wide);
         let both = ["project_chunk", "project_chunk_again"];
         let names = if lists || wide { &both[..1] } else { &both[..] };
@@ -138,20 +129,6 @@ impl Pipelines {
         plan: &wgpu::Buffer,
         picture: &PictureBuffers,
     ) -> Groups {
-        let group = |layout: &wgpu::BindGroupLayout, buffers: &[(u32, &wgpu::Buffer)]| {
-            let entries: Vec<_> = buffers
-                .iter()
-                .map(|&(binding, buffer)| wgpu::BindGroupEntry {
-                    binding,
-                    resource: buffer.as_entire_binding(),
-                })
-                .collect();
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout,
-                entries: &entries,
-            })
-        };
         let [x, y, z, extent] = &scene.place;
         let frame = &picture.frame;
         let second = match (&picture.entries, &picture.tails) {
@@ -184,13 +161,13 @@ impl Pipelines {
             resolve.extend([(3, colors), (4, layers)]);
             let buffers =
                 [(0, frame), (1, plan), (2, colors), (3, layers), (4, &picture.reflection)];
-            close = Some(group(&self.close_layout, &buffers));
+            close = Some(group(gpu, &self.close_layout, &buffers));
         } else {
             resolve.push((3, &picture.reflection));
         }
         Groups {
-            splat: group(&self.splat_layout, &splat),
-            resolve: group(&self.resolve_layout, &resolve),
+            splat: group(gpu, &self.splat_layout, &splat),
+            resolve: group(gpu, &self.resolve_layout, &resolve),
             close,
         }
     }
@@ -293,6 +270,43 @@ impl Pipelines {
             pass.draw(single..all, 0..images);
         }
     }
+}
+
+/// A compute pipeline; without a layout it gets the one that its text says.
+pub(super) fn compute(
+    gpu: &Gpu,
+    text: &str,
+    name: &str,
+    layout: Option<&wgpu::BindGroupLayout>,
+) -> wgpu::ComputePipeline {
+    gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(name),
+        layout: layout.map(|layout| pipeline_layout(gpu, layout)).as_ref(),
+        module: &module(gpu, text),
+        entry_point: Some(name),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    })
+}
+
+/// Buffers by binding.
+pub(super) fn group<'a>(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    buffers: impl IntoIterator<Item = &'a (u32, &'a wgpu::Buffer)>,
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = buffers
+        .into_iter()
+        .map(|&(binding, buffer)| wgpu::BindGroupEntry {
+            binding,
+            resource: buffer.as_entire_binding(),
+        })
+        .collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout,
+        entries: &entries,
+    })
 }
 
 fn pipeline_layout(gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::PipelineLayout {

@@ -2,11 +2,14 @@
 
 use std::fmt::Write as _;
 
+use super::look::{PAINTS, SURFACE_ROWS};
 use super::records::{LAYOUT, NO_OWNER};
 use crate::backend::cpu::splat::{EDGE_TOLERANCE, blend, projection};
 use crate::camera::three_ray::solve::MAX_STEPS;
 use crate::geometry::lanes::Scalar;
 use crate::plan::{CELL_SLACK_PX, LARGEST_ELLIPSE, SplatShape};
+use crate::scene::{environment, shade};
+use crate::visibility::SAMPLE_EIGHTHS;
 
 /// Workgroups along the first dimension of a grid: the most that every device has, and a power of two.
 pub(super) const GROUPS: u32 = 1 << 15;
@@ -34,6 +37,11 @@ const COMPUTE_KEYS: &str = file!("passes/compute_keys.wgsl");
 const RESOLVE_LISTS: &str = file!("passes/resolve_lists.wgsl");
 const RESOLVE_KEYS: &str = file!("passes/resolve_keys.wgsl");
 const CLOSE: &str = file!("passes/close.wgsl");
+const LOOK: &str = file!("look.wgsl");
+const SHADOW: &str = file!("shadow.wgsl");
+const DIRECT: &str = file!("passes/direct.wgsl");
+const ENVIRONMENT: &str = file!("passes/environment.wgsl");
+const COMPOSITE: &str = file!("passes/composite.wgsl");
 
 /// One constant, one place: those of the Rust code.
 fn constants(shape: SplatShape) -> String {
@@ -112,6 +120,43 @@ pub(super) fn resolve(shape: SplatShape, wide: bool) -> String {
 pub(super) fn close() -> String {
     [&constants(SplatShape::Ellipse), PLAN, CLOSE].concat()
 }
+
+/// The direct view, the environment and the composition, with their entry points.
+pub(super) fn looks() -> [(String, &'static str); 3] {
+    let mut text = String::new();
+    let mut number = |name: &str, value: f32| {
+        writeln!(text, "const {name}: f32 = {value:?}f;").expect("strings grow");
+    };
+    number("HORIZON_BLUR", environment::HORIZON_BLUR);
+    number("SUN_EDGE_OUTER", environment::SUN_EDGE[0]);
+    number("SUN_EDGE_INNER", environment::SUN_EDGE[1]);
+    number("SUN_DISC", environment::SUN_DISC);
+    number("TERMINATOR", shade::TERMINATOR);
+    number("NEIGHBORHOOD", shade::NEIGHBORHOOD);
+    number("TRIANGLE_EDGE", TRIANGLE_EDGE);
+    let packed = |axis: usize| {
+        let at = SAMPLE_EIGHTHS.iter().enumerate();
+        at.fold(0, |bits, (i, eighths)| bits | u32::from(eighths[axis]) << (4 * i))
+    };
+    let words = [
+        ("GROUPS", GROUPS),
+        ("PASSES", u32::try_from(shade::PASSES).expect("few")),
+        ("SAMPLES_X", packed(0)),
+        ("SAMPLES_Y", packed(1)),
+        ("SURFACE_ROWS", SURFACE_ROWS),
+    ];
+    for (name, value) in words.into_iter().chain(PAINTS) {
+        writeln!(text, "const {name}: u32 = {value}u;").expect("strings grow");
+    }
+    [
+        ([&text, LOOK, SHADOW, DIRECT].concat(), "draw_direct"),
+        ([&text, LOOK, ENVIRONMENT].concat(), "complete"),
+        ([&text, LOOK, COMPOSITE].concat(), "compose"),
+    ]
+}
+
+/// Triangles are grown by this for shadow rays, as weights: what f32 loses at their edges.
+const TRIANGLE_EDGE: f32 = 4e-5;
 
 /// The projection alone, behind which a test puts its entry point.
 #[cfg(test)]
