@@ -21,9 +21,15 @@ pub enum Limits {
     Core,
 }
 
+/// What is used of an adapter's features: timestamps and atomic keys of 64 bits, where they are there.
+pub fn features(adapter: &wgpu::Adapter) -> wgpu::Features {
+    adapter.features() & (ATOMICS_64 | wgpu::Features::TIMESTAMP_QUERY)
+}
+
 /// A device and its queue.
 pub(super) struct Gpu {
     pub(super) name: String,
+    pub(super) software: bool,
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) limits: wgpu::Limits,
@@ -39,9 +45,8 @@ pub(super) struct Gpu {
 impl Gpu {
     pub(super) fn open(wanted: Option<&str>, limits: Limits) -> Result<Self> {
         let (adapter, described) = choose(wanted)?;
-        let used = ATOMICS_64 | wgpu::Features::TIMESTAMP_QUERY;
         let (limits, features) = match limits {
-            Limits::Adapter => (adapter.limits(), adapter.features() & used),
+            Limits::Adapter => (adapter.limits(), features(&adapter)),
             Limits::Core => (wgpu::Limits::default(), wgpu::Features::empty()),
         };
         let descriptor = wgpu::DeviceDescriptor {
@@ -50,25 +55,32 @@ impl Gpu {
             required_limits: limits.clone(),
             ..Default::default()
         };
-        let name = described.name;
+        let name = &described.name;
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| failed(&name, &e.to_string()))?;
+            .map_err(|e| failed(name, &e.to_string()))?;
+        Ok(Self::of(&adapter, device, queue))
+    }
+
+    /// A device that is open.
+    pub(super) fn of(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let info = adapter.get_info();
         let lost = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&lost);
         device.set_device_lost_callback(move |_, _| flag.store(true, Ordering::Relaxed));
         // Errors are asked for where they can happen; what comes otherwise must not end the program.
         device.on_uncaptured_error(Arc::new(|_| {}));
-        Ok(Self {
-            name,
+        Self {
+            name: info.name,
+            software: info.device_type == wgpu::DeviceType::Cpu,
+            limits: device.limits(),
+            features: device.features(),
             device,
             queue,
-            limits,
-            features,
             #[cfg(test)]
             mutant: None,
             allocations: Cell::new(0),
             lost,
-        })
+        }
     }
 
     pub(super) fn is_lost(&self) -> bool {

@@ -5,9 +5,10 @@ use rayon::prelude::*;
 
 use super::buffers::Grown;
 use super::device::Gpu;
+use super::pipelines::{compute, dispatch, group};
 use super::records::Row;
 use super::scene::{packed_half, packed_normal};
-use super::shaders::{self, GROUPS};
+use super::shaders;
 use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
 use crate::error::Result;
@@ -80,14 +81,15 @@ pub(super) struct Composer {
     list: Vec<u32>,
     scene: Option<SceneLook>,
     picture: Option<PictureLook>,
+    /// Of these buffers: made when there were so many.
+    groups: Option<(usize, [wgpu::BindGroup; 3])>,
 }
 
 impl Composer {
     pub(super) fn new(gpu: &Gpu) -> Result<Self> {
         use wgpu::BufferUsages as U;
-        let pipelines = gpu.checked(|| {
-            shaders::looks().map(|(text, name)| super::pipelines::compute(gpu, &text, name, None))
-        })?;
+        let pipelines =
+            gpu.checked(|| shaders::looks().map(|(text, name)| compute(gpu, &text, name, None)))?;
         Ok(Self {
             pipelines,
             uniform: gpu.buffer("frame", size_of::<Uniform>() as u64, U::UNIFORM | U::COPY_DST)?,
@@ -95,6 +97,7 @@ impl Composer {
             list: Vec::new(),
             scene: None,
             picture: None,
+            groups: None,
         })
     }
 
@@ -127,31 +130,26 @@ impl Composer {
         let own = self.picture.as_ref().expect("it was made");
         let uniform = uniform(scene, eye, visibility, white, scene_look.scale);
         let bytes = size.pixels() as u64 * 16;
-        let SceneLook { triangles, surfaces, colors, nodes, obstacles, .. } = scene_look;
-        let common: [(u32, &wgpu::Buffer); 4] =
-            [(0, &self.uniform), (1, self.samples.buffer()), (2, triangles), (3, surfaces)];
-        let own_buffers: [&[(u32, &wgpu::Buffer)]; 3] = [
-            &[(4, colors), (5, nodes), (6, obstacles), (9, &own.direct)],
-            &[(7, reflection), (8, &own.completed)],
-            &[(8, &own.completed), (9, &own.direct), (10, &own.picture)],
-        ];
-        let draw = |encoder: &mut wgpu::CommandEncoder| {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            for (pipeline, more) in self.pipelines.iter().zip(own_buffers) {
-                let buffers = common.iter().chain(more);
-                let group =
-                    super::pipelines::group(gpu, &pipeline.get_bind_group_layout(0), buffers);
-                pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, &group, &[]);
-                let groups = u32::try_from(size.pixels().div_ceil(64)).unwrap_or(u32::MAX);
-                pass.dispatch_workgroups(groups.min(GROUPS), groups.div_ceil(GROUPS), 1);
-            }
-        };
+        let made = gpu.allocations.get();
+        if self.groups.as_ref().is_none_or(|(count, _)| *count != made) {
+            let groups = gpu.checked(|| self.groups_of(gpu, scene_look, own, reflection))?;
+            self.groups = Some((made, groups));
+        }
+        let groups = &self.groups.as_ref().expect("they were made").1;
         gpu.checked(|| {
             gpu.queue.write_buffer(self.samples.buffer(), 0, bytemuck::cast_slice(&self.list));
             gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            draw(&mut encoder);
+            let tasks = u32::try_from(size.pixels().div_ceil(64)).unwrap_or(u32::MAX);
+            {
+                let descriptor = wgpu::ComputePassDescriptor::default();
+                let mut pass = encoder.begin_compute_pass(&descriptor);
+                for (pipeline, group) in self.pipelines.iter().zip(groups) {
+                    pass.set_pipeline(pipeline);
+                    pass.set_bind_group(0, group, &[]);
+                    dispatch(&mut pass, tasks);
+                }
+            }
             encoder.copy_buffer_to_buffer(&own.picture, 0, &own.out, 0, bytes);
             gpu.queue.submit([encoder.finish()]);
         })?;
@@ -169,6 +167,29 @@ impl Composer {
         gpu.read::<[f32; 4], _>(&own.out, bytes, |colors| {
             let rgb = colors.par_iter().map(|&[r, g, b, _]| Vec3::new(r, g, b));
             rgb.collect_into_vec(mirrors);
+        })
+    }
+}
+
+impl Composer {
+    fn groups_of(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneLook,
+        own: &PictureLook,
+        reflection: &wgpu::Buffer,
+    ) -> [wgpu::BindGroup; 3] {
+        let SceneLook { triangles, surfaces, colors, nodes, obstacles, .. } = scene;
+        let common: [(u32, &wgpu::Buffer); 4] =
+            [(0, &self.uniform), (1, self.samples.buffer()), (2, triangles), (3, surfaces)];
+        let more: [&[(u32, &wgpu::Buffer)]; 3] = [
+            &[(4, colors), (5, nodes), (6, obstacles), (9, &own.direct)],
+            &[(7, reflection), (8, &own.completed)],
+            &[(8, &own.completed), (9, &own.direct), (10, &own.picture)],
+        ];
+        [0, 1, 2].map(|i| {
+            let layout = self.pipelines[i].get_bind_group_layout(0);
+            group(gpu, &layout, common.iter().chain(more[i]))
         })
     }
 }

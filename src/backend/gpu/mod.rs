@@ -23,7 +23,7 @@ use glam::{Vec3, Vec4};
 pub use self::adapters::{Adapter, adapters, may_be_there};
 use self::buffers::{Grown, PictureBuffers};
 use self::device::Gpu as Device;
-pub use self::device::Limits;
+pub use self::device::{Limits, features};
 use self::look::Composer;
 use self::pipelines::{Groups, Pipelines};
 use self::records::Records;
@@ -39,6 +39,8 @@ use crate::image::{Picture, Planes};
 use crate::plan::{Pass, Plan, Reflection, SplatPass, SplatShape};
 use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::Visibility;
+/// What [`Gpu::on_device`] takes.
+pub use wgpu;
 
 /// How splats are projected and drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,6 +61,8 @@ pub struct Options {
     pub path: Path,
     /// See [`Limits`].
     pub limits: Limits,
+    /// Compose the picture on the adapter too; `None`: if it is no software.
+    pub composes: Option<bool>,
     /// Count the points with an image, on the compute path; that costs time.
     pub stats: bool,
 }
@@ -101,6 +105,18 @@ impl Gpu {
         Ok(Self { name: ready.gpu.name.clone(), ready: Some(ready), options })
     }
 
+    /// A backend on a device that is open already, a window's for example. It should have what [`features`] says, and the
+    /// adapter's limits. Where it is lost, another one is opened as `options` say.
+    pub fn on_device(
+        adapter: &wgpu::Adapter,
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        options: Options,
+    ) -> Result<Self> {
+        let ready = Ready::on(Device::of(adapter, device, queue))?;
+        Ok(Self { name: ready.gpu.name.clone(), ready: Some(ready), options })
+    }
+
     /// The adapter's name.
     pub fn adapter(&self) -> &str {
         &self.name
@@ -132,7 +148,10 @@ impl Gpu {
 
 impl Ready {
     fn new(options: &Options) -> Result<Self> {
-        let gpu = Device::open(options.adapter.as_deref(), options.limits)?;
+        Self::on(Device::open(options.adapter.as_deref(), options.limits)?)
+    }
+
+    fn on(gpu: Device) -> Result<Self> {
         Ok(Self {
             timing: Timing::new(&gpu)?,
             plan: Grown::new("plan", wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST),
@@ -190,7 +209,8 @@ impl Backend for Gpu {
         white: f32,
         picture: &mut Picture,
     ) {
-        let ready = self.ready.as_mut();
+        let composes = self.options.composes;
+        let ready = self.ready.as_mut().filter(|r| composes.unwrap_or(!r.gpu.software));
         let done = ready.map(|r| r.compose(scene, eye, visibility, reflection, white, picture));
         if !matches!(done, Some(Ok(()))) {
             // Too large for the device, or that is gone: the reflection is here.
@@ -306,6 +326,15 @@ impl Ready {
     ) -> Result<(u32, Option<u32>)> {
         let gpu = &self.gpu;
         let size = visibility.size;
+        let side = gpu.limits.max_texture_dimension_2d;
+        if options.path == Path::Vertex && size.width.max(size.height) > side {
+            return Err(Error::input(
+                "--gpu-path vertex",
+                "",
+                format!("{} draws pictures of up to {side} pixels a side", gpu.name),
+                "use --gpu-path compute, a smaller --size, or --backend cpu",
+            ));
+        }
         let pipelines = &self.pipelines[index].1;
         let lists = pipelines.shape == SplatShape::Ellipse;
         let rows = self.records.rows();

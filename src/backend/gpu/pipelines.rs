@@ -329,7 +329,7 @@ fn module(gpu: &Gpu, text: &str) -> wgpu::ShaderModule {
     })
 }
 
-fn dispatch(pass: &mut wgpu::ComputePass<'_>, groups: u32) {
+pub(super) fn dispatch(pass: &mut wgpu::ComputePass<'_>, groups: u32) {
     pass.dispatch_workgroups(groups.min(GROUPS), groups.div_ceil(GROUPS), 1);
 }
 

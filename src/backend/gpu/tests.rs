@@ -1,6 +1,7 @@
 //! The shaders against f64, the plan's rows as they read them, and what a device does over several frames.
 
 mod footprints;
+mod looks;
 mod mutants;
 mod pictures;
 mod twins;
