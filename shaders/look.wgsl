@@ -34,7 +34,7 @@ struct Look {
 @group(0) @binding(1) var<storage, read> samples: array<u32>;
 /// Three rows a triangle, by id: position and packed normal of a corner, scene space.
 @group(0) @binding(2) var<storage, read> triangles: array<vec4<u32>>;
-/// Six rows a surface: see backend/gpu/look.rs.
+/// Six rows a surface: see backend/gpu/surfaces.rs.
 @group(0) @binding(3) var<storage, read> surfaces: array<vec4<u32>>;
 
 const NONE: u32 = 0xffffffffu;

@@ -2,6 +2,15 @@
 
 use crate::error::{Error, Result};
 
+/// What atomic keys of 64 bits need.
+pub(super) const ATOMICS_64: wgpu::Features =
+    wgpu::Features::SHADER_INT64.union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
+
+/// What is used of an adapter's features: timestamps and atomic keys of 64 bits, where they are there.
+pub fn features(adapter: &wgpu::Adapter) -> wgpu::Features {
+    adapter.features() & (ATOMICS_64 | wgpu::Features::TIMESTAMP_QUERY)
+}
+
 /// A graphics adapter of this machine.
 #[derive(Clone, Debug)]
 pub struct Adapter {
@@ -56,7 +65,7 @@ fn described(adapter: &wgpu::Adapter) -> Adapter {
         picture_px: limits.max_texture_dimension_2d,
         storage_buffers: limits.max_storage_buffers_per_shader_stage,
         timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
-        atomics_64: features.contains(super::device::ATOMICS_64),
+        atomics_64: features.contains(ATOMICS_64),
     }
 }
 

@@ -4,12 +4,8 @@ use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::adapters::choose;
+use super::adapters::{choose, features};
 use crate::error::{Error, Result};
-
-/// What atomic keys of 64 bits need.
-pub(super) const ATOMICS_64: wgpu::Features =
-    wgpu::Features::SHADER_INT64.union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
 
 /// What a device is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,11 +15,6 @@ pub enum Limits {
     Adapter,
     /// What every WebGPU implementation has, and no more.
     Core,
-}
-
-/// What is used of an adapter's features: timestamps and atomic keys of 64 bits, where they are there.
-pub fn features(adapter: &wgpu::Adapter) -> wgpu::Features {
-    adapter.features() & (ATOMICS_64 | wgpu::Features::TIMESTAMP_QUERY)
 }
 
 /// A device and its queue.

@@ -1,31 +1,21 @@
 //! The rest of a frame on the device: environment, direct view, composition. See `shaders/look.wgsl`.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::buffers::Grown;
 use super::device::Gpu;
 use super::pipelines::{compute, dispatch, group};
-use super::records::Row;
-use super::scene::{packed_half, packed_normal};
 use super::shaders;
+use super::surfaces::{Surfaces, list_samples};
 use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
 use crate::error::Result;
 use crate::image::Picture;
-use crate::scene::description::{Environment, Paint, PatternKind};
+use crate::scene::description::Environment;
 use crate::scene::prepared::PreparedScene;
 use crate::scene::shade::Sun;
-use crate::visibility::{NONE_ID, Visibility};
-
-/// Rows of a surface: first id, –, paint, first of its corners' colours; tint or first colour, period; second colour; the
-/// matrix from scene to local space, by row.
-pub(super) const SURFACE_ROWS: u32 = 6;
-/// How a surface is painted.
-pub(super) const PAINTS: [(&str, u32); 5] =
-    [("CONSTANT", 0), ("VERTEX", 1), ("CHECKER", 2), ("STRIPES", 3), ("RINGS", 4)];
-/// Marks a pixel whose samples show several triangles.
-const MIXED: u32 = 1 << 31;
+use crate::visibility::Visibility;
 
 /// As `Look` in `shaders/look.wgsl`.
 #[repr(C)]
@@ -53,17 +43,6 @@ pub(super) struct Uniform {
     pub(super) padding: u32,
 }
 
-/// A scene's triangles on the device.
-struct SceneLook {
-    version: u64,
-    triangles: wgpu::Buffer,
-    surfaces: wgpu::Buffer,
-    colors: wgpu::Buffer,
-    nodes: wgpu::Buffer,
-    obstacles: wgpu::Buffer,
-    scale: f32,
-}
-
 /// What depends on the picture's size.
 struct PictureLook {
     size: ImageSize,
@@ -79,7 +58,7 @@ pub(super) struct Composer {
     uniform: wgpu::Buffer,
     samples: Grown,
     list: Vec<u32>,
-    scene: Option<SceneLook>,
+    scene: Option<Surfaces>,
     picture: Option<PictureLook>,
     /// Of these buffers: made when there were so many.
     groups: Option<(usize, [wgpu::BindGroup; 3])>,
@@ -118,7 +97,7 @@ impl Composer {
         let version = scene.placement_version;
         if self.scene.as_ref().is_none_or(|s| s.version != version) {
             self.scene = None;
-            self.scene = Some(SceneLook::new(gpu, scene, visibility)?);
+            self.scene = Some(Surfaces::new(gpu, scene, visibility)?);
         }
         if self.picture.as_ref().is_none_or(|p| p.size != size) {
             self.picture = None;
@@ -175,11 +154,11 @@ impl Composer {
     fn groups_of(
         &self,
         gpu: &Gpu,
-        scene: &SceneLook,
+        scene: &Surfaces,
         own: &PictureLook,
         reflection: &wgpu::Buffer,
     ) -> [wgpu::BindGroup; 3] {
-        let SceneLook { triangles, surfaces, colors, nodes, obstacles, .. } = scene;
+        let Surfaces { triangles, surfaces, colors, nodes, obstacles, .. } = scene;
         let common: [(u32, &wgpu::Buffer); 4] =
             [(0, &self.uniform), (1, self.samples.buffer()), (2, triangles), (3, surfaces)];
         let more: [&[(u32, &wgpu::Buffer)]; 3] = [
@@ -207,115 +186,6 @@ impl PictureLook {
             out: gpu.buffer("pixels", bytes, U::MAP_READ | U::COPY_DST)?,
         })
     }
-}
-
-/// A word a pixel, then five for each pixel whose samples differ.
-fn list_samples(visibility: &Visibility, out: &mut Vec<u32>) {
-    let samples = &visibility.samples;
-    out.clear();
-    out.resize(samples.len(), 0);
-    let mixed = |ids: &[u32; 5]| ids.iter().any(|id| *id != ids[0]);
-    let mut count = 0;
-    for (to, ids) in out.iter_mut().zip(samples) {
-        *to = ids[0];
-        if mixed(ids) {
-            *to = MIXED | count;
-            count += 1;
-        }
-    }
-    out.extend(samples.iter().filter(|ids| mixed(ids)).flatten());
-}
-
-impl SceneLook {
-    fn new(gpu: &Gpu, scene: &PreparedScene, visibility: &Visibility) -> Result<Self> {
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        let sent = |label: &str, bytes: &[u8]| -> Result<wgpu::Buffer> {
-            let buffer = gpu.buffer(label, bytes.len() as u64, usage)?;
-            gpu.checked(|| gpu.queue.write_buffer(&buffer, 0, bytes))?;
-            Ok(buffer)
-        };
-        let mut triangles: Vec<Row> = Vec::new();
-        let corner = |position: Vec3, normal: Vec3| {
-            let [x, y, z] = position.to_array().map(f32::to_bits);
-            [x, y, z, packed_normal(normal)]
-        };
-        for mirror in &scene.mirrors {
-            for t in mirror.mesh.triangles() {
-                let at = |i: u32| corner(mirror.positions[i as usize], mirror.normals[i as usize]);
-                triangles.extend(t.map(at));
-            }
-        }
-        let mut colors: Vec<[u32; 2]> = vec![[0; 2]];
-        let mut surfaces: Vec<Row> = Vec::new();
-        let first_ids = visibility.first_ids();
-        for (mirror, first) in scene.mirrors.iter().zip(first_ids) {
-            surfaces.push([*first, 0, 0, 0]);
-            surfaces.push(bits(mirror.tint, 0.0));
-            surfaces.resize(surfaces.len() + 4, [0; 4]);
-        }
-        for (object, first) in scene.objects.iter().zip(&first_ids[scene.mirrors.len()..]) {
-            let rotated: Vec<Vec3> = object
-                .mesh
-                .normals()
-                .par_iter()
-                .map(|n| object.to_scene.direction(n.as_dvec3()).as_vec3().normalize_or(Vec3::Y))
-                .collect();
-            let rows = object.mesh.triangles().par_iter().flat_map_iter(|t| {
-                t.map(|i| corner(object.positions[i as usize], rotated[i as usize]))
-            });
-            triangles.par_extend(rows);
-            let (paint, color, period, second) = match object.paint {
-                Paint::Vertex if object.mesh.colors().is_empty() => (0, Vec3::ONE, 0.0, Vec3::ONE),
-                Paint::Constant(color) => (0, color, 0.0, color),
-                Paint::Vertex => (1, Vec3::ONE, 0.0, Vec3::ONE),
-                Paint::Pattern { kind, colors, period } => {
-                    let paint = match kind {
-                        PatternKind::Checker => 2,
-                        PatternKind::Stripes => 3,
-                        PatternKind::Rings => 4,
-                    };
-                    (paint, colors[0], period, colors[1])
-                }
-            };
-            let offset = u32::try_from(colors.len()).expect("as few as triangles");
-            surfaces.push([*first, 0, paint, offset]);
-            surfaces.push(bits(color, period));
-            surfaces.push(bits(second, 0.0));
-            // Rows of the matrix to local space: what it makes of the axes, and of the origin.
-            let local = |p: DVec3| object.to_scene.inverse_point(p);
-            let zero = local(DVec3::ZERO);
-            let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| local(axis) - zero);
-            for k in 0..3 {
-                surfaces
-                    .push(bits(DVec3::from_array(axes.map(|a| a[k])).as_vec3(), zero.as_vec3()[k]));
-            }
-            if paint == 1 {
-                let packed: Vec<[u32; 2]> = object
-                    .mesh
-                    .colors()
-                    .iter()
-                    .map(|c| [packed_half(c.x) | packed_half(c.y) << 16, packed_half(c.z)])
-                    .collect();
-                colors
-                    .extend(object.mesh.triangles().iter().flatten().map(|&i| packed[i as usize]));
-            }
-        }
-        let (nodes, obstacles, scale) = scene.triangles.parts();
-        let scale = if obstacles.is_empty() { 0.0 } else { scale };
-        Ok(Self {
-            version: scene.placement_version,
-            triangles: sent("triangles", bytemuck::cast_slice(&triangles))?,
-            surfaces: sent("surfaces", bytemuck::cast_slice(&surfaces))?,
-            colors: sent("colours", bytemuck::cast_slice(&colors))?,
-            nodes: sent("the triangles' tree", bytemuck::cast_slice(nodes))?,
-            obstacles: sent("triangles", bytemuck::cast_slice(&obstacles))?,
-            scale,
-        })
-    }
-}
-
-fn bits(v: Vec3, w: f32) -> Row {
-    v.extend(w).to_array().map(f32::to_bits)
 }
 
 fn uniform(
@@ -354,5 +224,3 @@ fn uniform(
         padding: 0,
     }
 }
-
-const _: () = assert!(NONE_ID == u32::MAX, "the shaders' word for no triangle");

@@ -12,6 +12,7 @@ mod pipelines;
 mod records;
 mod scene;
 mod shaders;
+mod surfaces;
 #[cfg(test)]
 mod tests;
 mod timing;
@@ -20,10 +21,10 @@ use std::time::Instant;
 
 use glam::{Vec3, Vec4};
 
-pub use self::adapters::{Adapter, adapters, may_be_there};
+pub use self::adapters::{Adapter, adapters, features, may_be_there};
 use self::buffers::{Grown, PictureBuffers};
 use self::device::Gpu as Device;
-pub use self::device::{Limits, features};
+pub use self::device::Limits;
 use self::look::Composer;
 use self::pipelines::{Groups, Pipelines};
 use self::records::Records;

@@ -1,8 +1,9 @@
 //! The passes' pipelines for one shape of splats, and how a frame runs through them.
 
 use super::Path;
+use super::adapters::ATOMICS_64;
 use super::buffers::{PictureBuffers, TARGET};
-use super::device::{ATOMICS_64, Gpu};
+use super::device::Gpu;
 use super::records::{CHUNK, Chunks};
 use super::scene::SceneBuffers;
 use super::shaders::{self, GROUPS};

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::look::{PAINTS, SURFACE_ROWS};
 use super::records::{LAYOUT, NO_OWNER};
+use super::surfaces::{PAINTS, SURFACE_ROWS};
 use crate::backend::cpu::splat::{EDGE_TOLERANCE, blend, projection};
 use crate::camera::three_ray::solve::MAX_STEPS;
 use crate::geometry::lanes::Scalar;
