@@ -23,6 +23,8 @@ pub struct FrameReport {
     pub method: &'static str,
     /// Backend id.
     pub backend: &'static str,
+    /// See [`Backend::device`].
+    pub device: Option<String>,
     /// Cameras (patch and object).
     pub cameras: Option<usize>,
     /// Batches.
@@ -187,6 +189,7 @@ impl Renderer {
         let report = FrameReport {
             method: method.info().id,
             backend: self.backend.id(),
+            device: self.backend.device(),
             cameras: splats.then_some(done.cameras),
             batches: splats.then_some(done.batches),
             projections: splats.then_some(done.projections),

@@ -161,6 +161,7 @@ impl TriangleBvh {
     }
 
     /// Whether a ray meets any triangle: see [`Ray`] for the arguments.
+    #[inline(always)]
     pub fn occluded(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> bool {
         self.find_any(&Ray { origin, direction, t_min, t_max }, &mut Traversal::default()).is_some()
     }

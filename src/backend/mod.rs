@@ -56,6 +56,11 @@ pub trait Backend: Send {
     /// Short name, as after `--backend`.
     fn id(&self) -> &'static str;
 
+    /// The device that it runs on, and how, where that is not the CPU.
+    fn device(&self) -> Option<String> {
+        None
+    }
+
     /// Executes `plan`; `out` becomes the reflection of every mirror pixel. With `planes` it also says what was
     /// seen, which is not timed.
     ///

@@ -8,7 +8,7 @@ use catoptric::{Context, Error};
 use clap::{ArgMatches, Args, Subcommand};
 use serde_json::json;
 
-use super::render::{HowArgs, figures};
+use super::render::{HowArgs, figures, where_it_ran};
 use super::{Ready, SceneArgs, check_json, chosen_method, ms, say, write_json};
 
 /// Measure, as ratios within one run
@@ -61,8 +61,9 @@ pub(crate) fn layer(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> any
     // Both look for what mirrors hide, or neither.
     let info = rays.info().param("mirror-occlusion");
     rays_params.set(info, params.choice(info.id))?;
+    let renderer = args.how.renderer(method)?;
     let ready = args.scene.ready(leaf, cx)?;
-    let mut a = Side::new(&ready, args.how.renderer(method)?, method, params, cx)?;
+    let mut a = Side::new(&ready, renderer, method, params, cx)?;
     let mut b = Side::new(&ready, Renderer::new(), rays, rays_params, cx)?;
     let (mut layers, mut traced, mut ratios, mut reports) = (vec![], vec![], vec![], vec![]);
     for i in 0..args.repeat + WARM_UP {
@@ -85,9 +86,10 @@ pub(crate) fn layer(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> any
     let (layer_ms, rays_ms) = (quartiles(&mut layers), quartiles(&mut traced));
     let ratio = quartiles(&mut ratios);
     say!(
-        "{} by {}: layer {:.2} ms, rays {:.2} ms, ratio {:.3} (quartiles {:.3} to {:.3}, {} pairs)",
+        "{} by {} on {}: layer {:.2} ms, rays {:.2} ms, ratio {:.3} (quartiles {:.3} to {:.3}, {} pairs)",
         ready.scene.name,
         report.method,
+        where_it_ran(&report),
         layer_ms[1],
         rays_ms[1],
         ratio[1],

@@ -62,7 +62,7 @@ pub(crate) struct HowArgs {
     /// Where it runs: auto (whatever is fastest here), cpu or gpu
     #[arg(long, value_name = "ID", default_value = "auto", value_parser = ["auto", "cpu", "gpu"])]
     pub(crate) backend: String,
-    /// Graphics adapter for --backend gpu: a part of its name, or its number in `info --adapters`
+    /// Graphics adapter, also a software one: a part of its name, or its number in `info --adapters`; means --backend gpu
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) adapter: Option<String>,
     /// Where the GPU projects: in compute shaders, or in a vertex shader as in the paper
@@ -84,6 +84,12 @@ impl HowArgs {
     /// A renderer on the backend that is asked for.
     pub(crate) fn renderer(&self, method: &dyn Method) -> anyhow::Result<Renderer> {
         let backend: Box<dyn Backend> = match self.backend.as_str() {
+            "cpu" if self.adapter.is_some() => {
+                let problem = "is for --backend gpu";
+                return Err(
+                    Error::input("--adapter", "", problem, "leave one of the two out").into()
+                );
+            }
             "cpu" => Box::new(Cpu::default()),
             "gpu" => self.gpu(method)?,
             _ if self.adapter.is_some() => self.gpu(method)?,
@@ -96,9 +102,11 @@ impl HowArgs {
     fn gpu(&self, method: &dyn Method) -> anyhow::Result<Box<dyn Backend>> {
         if !method.info().has_shaders {
             let problem = format!("--method {} has no shaders", method.info().id);
-            return Err(
-                Error::input("--backend gpu", "", problem, "use --backend cpu, or auto").into()
-            );
+            let (option, remedy) = match self.adapter {
+                Some(_) => ("--adapter", "leave it out"),
+                None => ("--backend gpu", "use --backend cpu, or auto"),
+            };
+            return Err(Error::input(option, "", problem, remedy).into());
         }
         let path = match self.gpu_path.as_str() {
             "vertex" => gpu::Path::Vertex,
@@ -132,8 +140,9 @@ pub(crate) fn run(args: &RenderArgs, matches: &ArgMatches, cx: &Context) -> anyh
         ("--json", args.json.as_deref()),
     ])?;
     let (method, params, leaf) = chosen_method(&args.how, matches)?;
-    let ready = args.scene.ready(leaf, cx)?;
+    // Before the scene: what is refused is to be refused at once.
     let mut renderer = args.how.renderer(method)?;
+    let ready = args.scene.ready(leaf, cx)?;
     if !args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         renderer.keep_bright();
     }
@@ -213,6 +222,12 @@ fn print_orbit(frames: u32, degrees: f64, found: Restlessness) {
     }
 }
 
+/// The backend, with its device.
+pub(crate) fn where_it_ran(report: &FrameReport) -> String {
+    let device = report.device.as_ref().map_or(String::new(), |device| format!(" ({device})"));
+    format!("{}{device}", report.backend)
+}
+
 /// The keys that the README documents. A stage that was not timed apart is null, and so is what the method has
 /// none of.
 pub(crate) fn figures(ready: &Ready, report: &FrameReport) -> Value {
@@ -222,6 +237,7 @@ pub(crate) fn figures(ready: &Ready, report: &FrameReport) -> Value {
         "scene": scene.name,
         "method": report.method,
         "backend": report.backend,
+        "device": report.device,
         "size": [size.width, size.height],
         "surfels": scene.surfel_count(),
         "mirror_triangles": scene.mirror_triangle_count(),
@@ -267,7 +283,7 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
         size.height,
         ready.scene.name,
         report.method,
-        report.backend
+        where_it_ran(report)
     );
     say!(
         "  {} surfels, {} mirror triangles, {} mirror pixels",

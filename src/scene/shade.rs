@@ -132,6 +132,7 @@ impl<'a> Sun<'a> {
     }
 
     /// Whether the sun lights one point.
+    #[inline(always)]
     pub fn visible_from(&self, point: &SurfacePoint) -> bool {
         let facing = point.normal.dot(self.to_sun);
         let ray = self.shadow_ray(point);

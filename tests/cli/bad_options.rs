@@ -76,7 +76,7 @@ fn options_of_methods() {
         ("--method raytrace --test slab", "--test: raytrace has no such parameter; leave it out"),
         ("--backend magic", "--backend"),
         ("--gpu-path magic", "--gpu-path"),
-        ("--backend gpu --adapter magic", "--adapter: no "),
+        ("--backend cpu --adapter 0", "--adapter: is for --backend gpu; leave one of the two out"),
         ("--repeat 0", "--repeat"),
         ("--repeat -1", "--repeat"),
         ("--repeat 1000000000", "--repeat"),

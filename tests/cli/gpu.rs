@@ -35,9 +35,10 @@ fn both_paths_draw_what_the_cpu_draws() {
         let how = format!("--backend gpu --adapter 0 --gpu-path {path} --stats --repeat 2");
         let run =
             folder.good(&format!("render {SMALL} {how} -o gpu.png --json gpu.json --aov gpu.exr"));
-        assert!(run.out.contains("on gpu"), "{}", run.out);
+        assert!(run.out.contains("on gpu (") && run.out.contains(path), "{}", run.out);
         let gpu = folder.json("gpu.json");
         assert_eq!(gpu["backend"], "gpu");
+        assert!(gpu["device"].as_str().unwrap().contains(path) && cpu["device"].is_null());
         for key in ["cameras", "batches", "projections"] {
             assert_eq!(gpu[key], cpu[key], "{key}");
         }
@@ -59,10 +60,54 @@ fn both_paths_draw_what_the_cpu_draws() {
 }
 
 #[test]
+fn adapters_that_are_not_there() {
+    let folder = Folder::new();
+    let some = !adapters(&folder).is_empty();
+    for wanted in ["magic", "99", "''"] {
+        let line = format!("render {SMALL} --adapter {wanted}");
+        let remedy = if some {
+            "choose a number or a part of a name of these: 0 ("
+        } else {
+            "--backend cpu"
+        };
+        folder.refused(&line, &["--adapter: ", remedy]);
+    }
+}
+
+#[test]
 fn rays_are_for_the_cpu() {
+    let expected = "--adapter: --method raytrace has no shaders; leave it out";
+    Folder::new().refused("render --adapter 0 --method raytrace", &[expected]);
     let line = "render --backend gpu --method raytrace";
     let expected = "--backend gpu: --method raytrace has no shaders; use --backend cpu, or auto";
     Folder::new().refused(line, &[expected]);
+}
+
+#[test]
+fn odd_views_are_drawn() {
+    let folder = Folder::new();
+    if adapters(&folder).is_empty() {
+        return;
+    }
+    for scene in [
+        "default --target 0,50,0",
+        "--mirror sphere",
+        "--mirror plane --object knot --eye 0.2,0.5,-2 --target 0,0.5,0",
+        "default --eye 1e12,0,0",
+        "default --fov 1e-9",
+        "default --fov 179.999",
+        "default --eye 0.1,0.35,0.1",
+        "knot --preset paper",
+    ] {
+        for path in ["compute", "vertex"] {
+            let line = format!("render {scene} {SMALL} --gpu-path {path}");
+            folder.good(&format!("{line} --backend gpu -o gpu.png"));
+            folder.good(&format!("{line} --backend cpu -o cpu.png"));
+            folder.good("compare gpu.png cpu.png --json c.json");
+            let flip = folder.json("c.json")["flip"].as_f64().unwrap();
+            assert!(flip <= 0.005, "{line}: {flip}");
+        }
+    }
 }
 
 #[test]
@@ -74,5 +119,6 @@ fn benches_run_on_it_too() {
     folder.good(&format!("bench layer {SMALL} --backend gpu --repeat 1 --json bench.json"));
     let bench = folder.json("bench.json");
     assert_eq!(bench["backend"], "gpu");
+    assert!(bench["device"].is_string());
     assert!(bench["ratio"]["median"].as_f64().unwrap() > 0.0);
 }

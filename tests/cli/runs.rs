@@ -9,10 +9,11 @@ fn keys(value: &Value) -> Vec<&str> {
 }
 
 /// The keys of a frame's figures, in order.
-const FIGURES: [&str; 16] = [
+const FIGURES: [&str; 17] = [
     "scene",
     "method",
     "backend",
+    "device",
     "size",
     "surfels",
     "mirror_triangles",

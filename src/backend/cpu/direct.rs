@@ -4,10 +4,12 @@
 //! *before* that: next to something brighter than white, an edge would otherwise be as jagged as without
 //! antialiasing, since a fifth of the pixel would already turn all of it white.
 
+use fearless_simd::dispatch;
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
 use crate::camera::Eye;
+use crate::geometry::lanes::simd_level;
 use crate::visibility::{RayWeights, SAMPLE_EIGHTHS, SAMPLES, SurfaceMesh, Visibility};
 
 /// A point of an object that the eye sees.
@@ -70,11 +72,15 @@ pub fn compose(view: &DirectView, appearance: &impl Appearance, out: &mut [Vec3]
     let pixels = view.visibility.size.pixels();
     assert_eq!((view.reflection.len(), out.len()), (pixels, pixels), "planes of one size");
     let width = view.visibility.size.width as usize;
+    let level = simd_level();
     out.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
-        let mut painter = Painter { view, appearance, last: None };
-        for (x, pixel) in row.iter_mut().enumerate() {
-            *pixel = painter.pixel(x, y);
-        }
+        // By the best instructions that there are: most of it is tracing shadow rays.
+        dispatch!(level, _ => {
+            let mut painter = Painter { view, appearance, last: None };
+            for (x, pixel) in row.iter_mut().enumerate() {
+                *pixel = painter.pixel(x, y);
+            }
+        });
     });
 }
 
@@ -163,6 +169,7 @@ struct Met {
 }
 
 impl<A: Appearance> Painter<'_, A> {
+    #[inline(always)]
     fn pixel(&mut self, x: usize, y: usize) -> Vec3 {
         let visibility = self.view.visibility;
         let at = y * visibility.size.width as usize + x;
@@ -199,6 +206,7 @@ impl<A: Appearance> Painter<'_, A> {
         sum / SAMPLES as f32
     }
 
+    #[inline(always)]
     fn seen(&self, id: u32) -> Seen {
         let (surface, triangle) = self.view.visibility.locate(id).unzip();
         Seen { surface, triangle: triangle.unwrap_or(0), id }
@@ -246,6 +254,7 @@ impl<A: Appearance> Painter<'_, A> {
     }
 
     /// The sum of a group's samples on an object.
+    #[inline(always)]
     fn object(
         &mut self,
         pixel: [usize; 2],
@@ -266,6 +275,7 @@ impl<A: Appearance> Painter<'_, A> {
 
     /// Where the view ray through `px` meets the triangle. Where the ray passes it, which it does by less
     /// than a pixel, its negative weights are taken for zero.
+    #[inline(always)]
     fn hit(&mut self, Seen { triangle, id, .. }: Seen, object: usize, px: DVec2) -> Hit {
         let view = self.view;
         let met = match &self.last {

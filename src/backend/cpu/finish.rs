@@ -104,10 +104,12 @@ struct Look<'a> {
 }
 
 impl Appearance for Look<'_> {
+    #[inline(always)]
     fn albedo(&self, hit: &Hit) -> Vec3 {
         self.scene.objects[hit.object].albedo(hit.triangle, hit.weights)
     }
 
+    #[inline(always)]
     fn light(&self, hit: &Hit) -> Vec3 {
         let normal = self.scene.objects[hit.object].normal(hit.triangle, hit.weights);
         let point = SurfacePoint { position: hit.point, normal, extent: 0.0 };

@@ -84,27 +84,31 @@ pub fn adapters() -> Vec<Adapter> {
 pub(super) fn choose(wanted: Option<&str>) -> Result<(wgpu::Adapter, Adapter)> {
     let all = list(&instance());
     let names: Vec<String> =
-        all.iter().enumerate().map(|(i, a)| format!("{i} {}", a.get_info().name)).collect();
+        all.iter().enumerate().map(|(i, a)| format!("{i} ({})", a.get_info().name)).collect();
     let found = match wanted {
         None => all.into_iter().next(),
         Some(wanted) => {
             let number = wanted.parse::<usize>().ok();
-            let lower = wanted.to_lowercase();
+            let lower = wanted.trim().to_lowercase();
             all.into_iter().enumerate().find_map(|(i, adapter)| {
-                let named = adapter.get_info().name.to_lowercase().contains(&lower);
+                let name = adapter.get_info().name.to_lowercase();
+                let named = !lower.is_empty() && name.contains(&lower);
                 (number.map_or(named, |number| number == i)).then_some(adapter)
             })
         }
     };
     let Some(adapter) = found else {
-        let problem = match wanted {
-            Some(wanted) if !names.is_empty() => {
-                format!("no adapter is called {wanted}: there is {}", names.join(", "))
-            }
-            _ => "no graphics adapter was found".to_owned(),
-        };
         let option = if wanted.is_some() { "--adapter" } else { "--backend gpu" };
-        let remedy = "install a Vulkan driver, or use --backend cpu";
+        let (problem, remedy) = match wanted {
+            Some(wanted) if !names.is_empty() => (
+                format!("there is no adapter {wanted:?}"),
+                format!("choose a number or a part of a name of these: {}", names.join(", ")),
+            ),
+            _ => (
+                "no graphics adapter was found".to_owned(),
+                "install a Vulkan driver, or use --backend cpu".to_owned(),
+            ),
+        };
         return Err(Error::input(option, "", problem, remedy));
     };
     let description = described(&adapter);

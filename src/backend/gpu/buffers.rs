@@ -62,7 +62,7 @@ impl PictureBuffers {
         let own = U::STORAGE | U::COPY_SRC;
         let out = U::MAP_READ | U::COPY_DST;
         // Keys of 64 bits, or of 32 and their count.
-        let heads = gpu.buffer("pixels", pixels * 8 + 8, own | U::COPY_DST)?;
+        let heads = gpu.buffer("the pixels", pixels * 8 + 8, own | U::COPY_DST)?;
         let side = gpu.limits.max_texture_dimension_2d;
         let extent = wgpu::Extent3d {
             width: size.width.min(side),
@@ -88,20 +88,20 @@ impl PictureBuffers {
             heads,
             tails: match lists {
                 true => None,
-                false => Some(gpu.buffer("pixels", pixels * 4 + 4, own | U::COPY_DST)?),
+                false => Some(gpu.buffer("the pixels", pixels * 4 + 4, own | U::COPY_DST)?),
             },
             entries: match lists {
                 true => Some([
                     gpu.buffer("splats of all pixels", u64::from(capacity) * 16, own)?,
-                    gpu.buffer("pixels", pixels * 16, own)?,
-                    gpu.buffer("pixels", pixels * 16, own)?,
+                    gpu.buffer("the pixels", pixels * 16, own)?,
+                    gpu.buffer("the pixels", pixels * 16, own)?,
                 ]),
                 false => None,
             },
-            reflection: gpu.buffer("pixels", pixels * 16, own)?,
-            nearest: gpu.buffer("pixels", pixels * 8, own)?,
-            colors_out: gpu.buffer("pixels", pixels * 16, out)?,
-            nearest_out: gpu.buffer("pixels", pixels * 8, out)?,
+            reflection: gpu.buffer("the pixels", pixels * 16, own)?,
+            nearest: gpu.buffer("the pixels", pixels * 8, own)?,
+            colors_out: gpu.buffer("the pixels", pixels * 16, out)?,
+            nearest_out: gpu.buffer("the pixels", pixels * 8, out)?,
             count: gpu.buffer("count", 16, out)?,
             target: texture.create_view(&wgpu::TextureViewDescriptor::default()),
         })

@@ -121,12 +121,15 @@ impl Gpu {
                 "--backend gpu",
                 "",
                 format!(
-                    "{label} need {} MB in one piece, and {} has {} at most",
-                    bytes.div_ceil(1_000_000),
+                    "{label} take {} MiB in one piece, and {} allows {} MiB",
+                    bytes.div_ceil(1 << 20),
                     self.name,
-                    most / 1_000_000
+                    most >> 20
                 ),
-                "use fewer --surfels or a smaller --size, or --backend cpu",
+                match label.starts_with("surfels") {
+                    true => "use fewer --surfels, or --backend cpu",
+                    false => "use a smaller --size, or --backend cpu",
+                },
             ));
         }
         self.allocations.set(self.allocations.get() + 1);
@@ -172,6 +175,11 @@ impl Gpu {
 }
 
 fn failed(name: &str, problem: &str) -> Error {
-    let problem = format!("{name} failed: {}", problem.trim().replace('\n', " "));
-    Error::input("--backend gpu", "", problem, "use another --adapter, or --backend cpu")
+    let problem = problem.trim().trim_end_matches('.').replace('\n', " ");
+    // Drivers say it in many ways.
+    let remedy = match problem.to_lowercase().contains("memory") {
+        true => "use fewer --surfels or a smaller --size, or --backend cpu",
+        false => "use another --adapter, or --backend cpu",
+    };
+    Error::input("--backend gpu", "", format!("{name} failed: {problem}"), remedy)
 }

@@ -177,13 +177,13 @@ impl PictureLook {
     fn new(gpu: &Gpu, size: ImageSize) -> Result<Self> {
         use wgpu::BufferUsages as U;
         let bytes = size.pixels() as u64 * 16;
-        let own = || gpu.buffer("pixels", bytes, U::STORAGE | U::COPY_SRC);
+        let own = || gpu.buffer("the pixels", bytes, U::STORAGE | U::COPY_SRC);
         Ok(Self {
             size,
             completed: own()?,
             direct: own()?,
             picture: own()?,
-            out: gpu.buffer("pixels", bytes, U::MAP_READ | U::COPY_DST)?,
+            out: gpu.buffer("the pixels", bytes, U::MAP_READ | U::COPY_DST)?,
         })
     }
 }

@@ -155,7 +155,10 @@ impl Ready {
     fn on(gpu: Device) -> Result<Self> {
         Ok(Self {
             timing: Timing::new(&gpu)?,
-            plan: Grown::new("plan", wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST),
+            plan: Grown::new(
+                "the lists of a frame",
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            ),
             gpu,
             pipelines: Vec::new(),
             scene: None,
@@ -172,6 +175,14 @@ impl Ready {
 impl Backend for Gpu {
     fn id(&self) -> &'static str {
         "gpu"
+    }
+
+    fn device(&self) -> Option<String> {
+        let path = match self.options.path {
+            Path::Vertex => "vertex",
+            Path::Compute => "compute",
+        };
+        Some(format!("{}, {path} path", self.name))
     }
 
     fn execute(

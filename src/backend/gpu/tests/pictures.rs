@@ -271,7 +271,7 @@ fn bad_wishes_are_refused() {
     let core = Device::open(None, Limits::Core).expect("it was opened before");
     let large = ImageSize { width: 16384, height: 16384 };
     let error = PictureBuffers::new(&core, large, 16, true).err().expect("too large").to_string();
-    assert!(error.contains("in one piece") && error.contains("--backend cpu"), "{error}");
+    assert!(error.contains("MiB in one piece") && error.contains("--backend cpu"), "{error}");
     assert!(Gpu::new(named("99")).is_err());
     assert!(Gpu::new(named("0")).is_ok());
     let mut backend = gpu(Path::Compute, Limits::Adapter);
