@@ -36,6 +36,12 @@ fn form_of(steps: Steps, size: f32) -> vec3<f32> {
     return vec3(dot(steps.right, steps.right), dot(steps.right, steps.down), dot(steps.down, steps.down)) * size;
 }
 
+/// The determinant of the form for a size of 1, which the difference of products would lose.
+fn det_of(steps: Steps) -> f32 {
+    let across = cross(steps.right, steps.down);
+    return dot(across, across);
+}
+
 fn steps_about(camera: u32, image: Image, d: vec3<f32>) -> Steps {
     let right = image.lambda * row(camera + PER_PX + 2u).xyz + row(camera + PER_PX).xyz;
     let down = image.lambda * row(camera + PER_PX + 3u).xyz + row(camera + PER_PX + 1u).xyz;
@@ -48,7 +54,7 @@ fn correction(steps: Steps, apart: vec3<f32>) -> vec2<f32> {
     let form = form_of(steps, 1.0);
     let u = dot(steps.right, apart);
     let v = dot(steps.down, apart);
-    let det = form.x * form.z - form.y * form.y;
+    let det = det_of(steps);
     var moved = vec2(0.0);
     if 0.0 < det {
         moved = vec2(u * form.z - v * form.y, v * form.x - u * form.y) * (-1.0 / det);
@@ -182,7 +188,7 @@ fn splat_of(job: Job, image: Image) -> Splat {
         if !on.facing {
             return s;
         }
-        kernel(&s, form_of(on.steps, size));
+        kernel(&s, form_of(on.steps, size), det_of(on.steps) * (size * size));
         s.weight *= on.thin;
         s.range = SAME_SURFACE_RADII * radius / sqrt(size);
         s.drawn = all(s.middle + s.half >= vec2(0.0)) && all(s.middle - s.half < end);
@@ -196,17 +202,19 @@ fn splat_of(job: Job, image: Image) -> Splat {
 }
 
 /// A splat's kernel in the picture, from the disk that holds its surfel.
-fn kernel(s: ptr<function, Splat>, form: vec3<f32>) {
+fn kernel(s: ptr<function, Splat>, form: vec3<f32>, own_det: f32) {
     let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
     let b = form.y;
-    let most = 1.0 / max(form.x * form.z - b * b, least * least * least);
+    let most = 1.0 / max(own_det, least * least * least);
+    let det = own_det + (form.x + form.z) * least + least * least;
     let a = form.x + least;
     let c = form.z + least;
-    let spread = SPREAD * SPREAD / max(a * c - b * b, least * least);
-    let xx = c * spread + PIXEL * PIXEL;
+    let spread = SPREAD * SPREAD / det;
+    let pixel = PIXEL * PIXEL;
+    let xx = c * spread + pixel;
     let xy = b * spread;
-    let yy = a * spread + PIXEL * PIXEL;
-    let per_det = 1.0 / (xx * yy - xy * xy);
+    let yy = a * spread + pixel;
+    let per_det = 1.0 / (spread * spread * det + spread * (a + c) * pixel + pixel * pixel);
     (*s).form = vec3(yy, xy, xx) * per_det;
     (*s).half = vec2(sqrt(xx), sqrt(yy));
     (*s).weight = sqrt(most * per_det) * (3.0 * PER_DISK);

@@ -8,7 +8,7 @@ use super::{BORDER, EDGE_TOLERANCE};
 use crate::camera::three_ray::project::along;
 use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
-use crate::geometry::lanes::{Real, Vector, dot, dot_const};
+use crate::geometry::lanes::{Real, Vector, cross, dot, dot_const};
 use crate::plan::{
     CELL_SLACK_PX, CameraInstance, DepthKey, EVENNESS, LARGEST_ELLIPSE, SplatPass, SplatShape,
 };
@@ -29,18 +29,21 @@ pub(crate) const SPREAD: f32 = 1.3;
 pub(crate) const PIXEL: f32 = 0.7;
 
 impl<R: Real<Scalar = f32>> Kernel<R> {
-    /// Of the disk that holds a surfel, see [`Frame::form`].
+    /// Of the disk that holds a surfel, see [`Frame::form`], and the form's determinant. Of a thin ellipse it would be
+    /// lost in the difference of products, so those are never taken.
     #[inline(always)]
-    fn new([a, b, c]: [R; 3]) -> Self {
+    fn new([a, b, c]: [R; 3], det: R) -> Self {
         let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
         // Near a caustic it is larger than what is drawn of it: that is to count for all of it.
-        let most = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least * least));
+        let most = a.splat(1.0) / det.max(a.splat(least * least * least));
+        let det = det + (a + c) * least + least * least;
         let (a, c) = (a + least, c + least);
-        let inverse = a.splat(1.0) / (a * c - b * b).max(a.splat(least * least));
         // The disk's ellipse and the pixel's add as variances do.
-        let spread = inverse * (SPREAD * SPREAD);
-        let (xx, xy, yy) = (c * spread + PIXEL * PIXEL, b * spread, a * spread + PIXEL * PIXEL);
-        let per_det = a.splat(1.0) / (xx * yy - xy * xy);
+        let spread = a.splat(SPREAD * SPREAD) / det;
+        let pixel = PIXEL * PIXEL;
+        let (xx, xy, yy) = (c * spread + pixel, b * spread, a * spread + pixel);
+        let both = spread * spread * det + spread * (a + c) * pixel + pixel * pixel;
+        let per_det = a.splat(1.0) / both;
         Self {
             form: [yy * per_det, xy * per_det, xx * per_det],
             half: [xx.sqrt(), yy.sqrt()],
@@ -58,6 +61,13 @@ struct Frame<R> {
 }
 
 impl<R: Real<Scalar = f32>> Frame<R> {
+    /// The determinant of the form for a size of 1.
+    #[inline(always)]
+    fn det(&self) -> R {
+        let across = cross(self.right, self.down);
+        dot(across, across)
+    }
+
     /// a, b, c: the squared distance a x² + 2 b x y + c y² from the surfel of the ray through a place (x, y) pixels
     /// away, in the surfel's radius.
     #[inline(always)]
@@ -180,7 +190,8 @@ impl Projection<'_> {
                     let normal = self.normals(simd, &packed.surfel[i..]);
                     let (frame, facing, thin) = self.on_surface(&frame, d, normal);
                     lands = lands & facing;
-                    let Kernel { form, half: [wide, high], weight } = Kernel::new(frame.form(size));
+                    let Kernel { form, half: [wide, high], weight } =
+                        Kernel::new(frame.form(size), frame.det() * (size * size));
                     let weight = weight * thin;
                     lands = lands
                         & zero.le(x + wide)
@@ -277,7 +288,7 @@ impl Projection<'_> {
         let zero = V::broadcast(simd, 0.0);
         let [a, b, c] = frame.form(V::broadcast(simd, 1.0));
         let (u, v) = (dot(frame.right, apart), dot(frame.down, apart));
-        let det = a * c - b * b;
+        let det = frame.det();
         let usable = zero.lt(det);
         let share = V::select(usable, V::broadcast(simd, -1.0) / det, zero);
         let limit = V::broadcast(simd, MOST_CORRECTION_PX);

@@ -10,7 +10,7 @@ use super::twins::unpacked_normal;
 use super::{device, run};
 use crate::backend::cpu::splat::projection as constants;
 use crate::context::Context;
-use crate::geometry::lanes::{Real, Scalar, dot};
+use crate::geometry::lanes::{Real, Scalar, cross, dot};
 use crate::methods::{FrameInput, Params, method};
 use crate::plan::{CameraInstance, LARGEST_ELLIPSE, Pass, Plan, SplatPass, SplatShape};
 use crate::scene::PreparedScene;
@@ -142,7 +142,8 @@ fn by_hand<T: Scalar + Real<Scalar = T, Mask = bool>>(
         // Least squares: right x + down y = -apart.
         let (rr, rd, dd) = (dot(right, right), dot(right, down), dot(down, down));
         let (u, v) = (dot(right, apart), dot(down, apart));
-        let det = rr * dd - rd * rd;
+        let turned = cross(right, down);
+        let det = dot(turned, turned);
         let limit = |v: T| {
             T::from_f64(v.to_f64().clamp(
                 -f64::from(constants::MOST_CORRECTION_PX),
@@ -178,13 +179,15 @@ fn by_hand<T: Scalar + Real<Scalar = T, Mask = bool>>(
     let (a, b, e) = (dot(right, right) * size, dot(right, down) * size, dot(down, down) * size);
     // The disk's ellipse, no longer than the largest, wider by SPREAD, and the pixel's.
     let limit = T::from_f64(f64::from(LARGEST_ELLIPSE).powi(-2));
-    let area = T::from_f64(1.0) / (a * e - b * b).max(limit * limit * limit);
+    let turned = cross(right, down);
+    let own = dot(turned, turned) * (size * size);
+    let area = T::from_f64(1.0) / own.max(limit * limit * limit);
+    let own = own + (a + e) * limit + limit * limit;
     let (a, e) = (a + limit, e + limit);
-    let spread =
-        T::from_f64(f64::from(constants::SPREAD).powi(2)) / (a * e - b * b).max(limit * limit);
+    let spread = T::from_f64(f64::from(constants::SPREAD).powi(2)) / own;
     let pixel = T::from_f64(f64::from(constants::PIXEL).powi(2));
     let (xx, xy, yy) = (e * spread + pixel, b * spread, a * spread + pixel);
-    let det = xx * yy - xy * xy;
+    let det = spread * spread * own + spread * (a + e) * pixel + pixel * pixel;
     let thin = facing / facing.max(least);
     let weight = (area / det).sqrt() * T::from_f64(3.0 * thin * f64::from(constants::PER_DISK));
     let range = T::from_f64(f64::from(constants::SAME_SURFACE * c.radius)) / size.sqrt();
