@@ -7,6 +7,7 @@ mod pictures;
 mod twins;
 
 use std::io::Write as _;
+use std::sync::Once;
 
 use super::device::{Gpu as Device, Limits};
 use super::records::Row;
@@ -14,7 +15,13 @@ use super::records::Row;
 /// A device for a test; `None` where there is no adapter, which is said. With `CATOPTRIC_REQUIRE_GPU=1` that is a failure.
 fn device() -> Option<Device> {
     match Device::open(None, Limits::Adapter) {
-        Ok(device) => Some(device),
+        Ok(device) => {
+            static SAID: Once = Once::new();
+            SAID.call_once(|| {
+                let _ = writeln!(std::io::stderr(), "GPU: tested on {}", device.name);
+            });
+            Some(device)
+        }
         Err(error) => {
             let required = std::env::var("CATOPTRIC_REQUIRE_GPU").is_ok_and(|v| v == "1");
             assert!(!required, "{error}");
