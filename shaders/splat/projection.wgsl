@@ -95,8 +95,8 @@ fn on_surface(camera: u32, steps: Steps, d: vec3<f32>, normal: vec3<f32>) -> OnS
 }
 
 /// A square's pixels whose centres lie too far away for their rays to see the surfel.
-fn fills_of(form: vec3<f32>, first: vec2<f32>) -> u32 {
-    let least = (form.x * form.z - form.y * form.y) / (form.x + form.z) * (REACH * REACH);
+fn fills_of(form: vec3<f32>, det: f32, first: vec2<f32>) -> u32 {
+    let least = det / (form.x + form.z) * (REACH * REACH);
     var bits = 0u;
     for (var i = 0u; i < SIDE * SIDE; i++) {
         let at = first + select(vec2(0.5), vec2(f32(i % 2u), f32(i / 2u)), SIDE == 2u);
@@ -195,7 +195,7 @@ fn splat_of(job: Job, image: Image) -> Splat {
     } else {
         s.drawn = all(s.middle >= vec2(0.0)) && all(s.middle < end);
         let first = floor(s.middle);
-        s.fills = fills_of(form_of(steps, size), first - s.middle);
+        s.fills = fills_of(form_of(steps, size), det_of(steps) * (size * size), first - s.middle);
         s.middle = first;
     }
     return s;

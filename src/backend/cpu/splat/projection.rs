@@ -218,7 +218,9 @@ impl Projection<'_> {
                         continue;
                     }
                     let cell = [x.floor(), y.floor()];
-                    let fills = self.fills(frame.form(size), [cell[0] - x, cell[1] - y]);
+                    let det = frame.det() * (size * size);
+                    let from = [cell[0] - x, cell[1] - y];
+                    let fills = self.fills(frame.form(size), det, from);
                     V::compress_cells(cell, self.stride, fills, lands, &mut hits.cell[len..]);
                 }
                 depth.compress(lands, &mut hits.depth[len..]);
@@ -341,12 +343,12 @@ impl Projection<'_> {
     /// The low bits of [`Hits::cell`], as a number; `from` leads from the image to where the splat's first sample
     /// begins.
     #[inline(always)]
-    fn fills<R: Real<Scalar = f32>>(&self, [a, b, c]: [R; 3], from: [R; 2]) -> R {
+    fn fills<R: Real<Scalar = f32>>(&self, [a, b, c]: [R; 3], det: R, from: [R; 2]) -> R {
         let (one, zero) = (a.splat(1.0), a.splat(0.0));
         // A disk of that distance holds a surfel. Where it is seen so long that it leaves the splat's reach, it has
         // to be as much wider to hold one within it.
         let reach = self.pass.shape.reach();
-        let least = (a * c - b * b) / (a + c) * (reach * reach);
+        let least = det / (a + c) * (reach * reach);
         let mut fills = zero;
         let pixels: &[_] = match self.pass.shape {
             SplatShape::Ellipse => &[],
