@@ -49,6 +49,8 @@ impl Gpu {
         let name = &described.name;
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| failed(name, &e.to_string()))?;
+        // Errors are asked for where they can happen; what comes otherwise must not end the program.
+        device.on_uncaptured_error(Arc::new(|_| {}));
         Ok(Self::of(&adapter, device, queue))
     }
 
@@ -58,8 +60,6 @@ impl Gpu {
         let lost = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&lost);
         device.set_device_lost_callback(move |_, _| flag.store(true, Ordering::Relaxed));
-        // Errors are asked for where they can happen; what comes otherwise must not end the program.
-        device.on_uncaptured_error(Arc::new(|_| {}));
         Self {
             name: info.name,
             software: info.device_type == wgpu::DeviceType::Cpu,

@@ -285,7 +285,15 @@ impl Ready {
             self.scene = Some(SceneBuffers::new(&self.gpu, scene)?);
         }
         let start = Instant::now();
-        let mut report = self.records.fill(pass, visibility);
+        let most = self.gpu.most_elements(size_of::<records::Row>());
+        let Some(mut report) = self.records.fill(pass, visibility, most) else {
+            return Err(Error::input(
+                "--backend gpu",
+                "",
+                format!("there are more surfels to project than {} can be told of", self.gpu.name),
+                "use --test slab, a --detail above 0 or a smaller --size, or --backend cpu",
+            ));
+        };
         let pipelines = match self.pipelines.iter().position(|(shape, _)| *shape == pass.shape) {
             Some(i) => i,
             None => {
@@ -347,6 +355,15 @@ impl Ready {
                 "use --gpu-path compute, a smaller --size, or --backend cpu",
             ));
         }
+        let chunks = self.records.chunks();
+        if options.path == Path::Vertex && chunks.vertices().is_none() {
+            return Err(Error::input(
+                "--gpu-path vertex",
+                "",
+                "there are more surfels to project than one draw takes",
+                "use --gpu-path compute, or --backend cpu",
+            ));
+        }
         let pipelines = &self.pipelines[index].1;
         let lists = pipelines.shape == SplatShape::Ellipse;
         let rows = self.records.rows();
@@ -375,7 +392,6 @@ impl Ready {
             if let Some(tails) = &picture.tails {
                 encoder.clear_buffer(tails, 0, None);
             }
-            let chunks = self.records.chunks();
             pipelines.encode(&mut encoder, groups, picture, path, chunks, self.timing.as_ref());
             let pixels = size.pixels() as u64;
             let (from, at) = match &picture.tails {

@@ -1,5 +1,6 @@
 //! A splat pass as rows of four words: what the shaders read of cameras, patches, batches and pixels.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -79,6 +80,11 @@ impl Chunks {
     pub(super) fn all(self) -> u32 {
         self.single + self.several
     }
+
+    /// Vertices of the quads of all; `None` if they cannot be counted in a draw.
+    pub(super) fn vertices(self) -> Option<u32> {
+        self.all().checked_mul(6 * CHUNK)
+    }
 }
 
 /// The rows of one frame; reused.
@@ -106,15 +112,30 @@ struct Part {
 const CAMERAS: usize = 32;
 
 impl Records {
-    /// Culls, and lists everything; the report has what is known by then.
-    pub(super) fn fill(&mut self, pass: &SplatPass<'_>, visibility: &Visibility) -> ExecuteReport {
+    /// Culls, and lists everything; the report has what is known by then. `None` if there are more than `most` rows: they
+    /// are not all made first.
+    pub(super) fn fill(
+        &mut self,
+        pass: &SplatPass<'_>,
+        visibility: &Visibility,
+        most: u32,
+    ) -> Option<ExecuteReport> {
         let size = visibility.size;
         let tasks = pass.cameras.len().div_ceil(CAMERAS);
         if self.parts.len() < tasks {
             self.parts.resize_with(tasks, Part::default);
         }
         let lists = pass.cameras.par_chunks(CAMERAS).zip(&mut self.parts).enumerate();
-        lists.for_each(|(task, (cameras, part))| part.fill(pass, task * CAMERAS, cameras));
+        let rows = AtomicUsize::new(pass.cameras.len() * CAMERA_ROWS);
+        let most = most as usize;
+        lists.for_each(|(task, (cameras, part))| {
+            part.fill(pass, task * CAMERAS, cameras, &rows, most);
+        });
+        if rows.into_inner() > most {
+            // Their memory too.
+            self.parts.clear();
+            return None;
+        }
         let parts = &self.parts[..tasks];
 
         let rows = &mut self.rows;
@@ -169,14 +190,14 @@ impl Records {
         self.frame = frame;
 
         let threads = rayon::current_num_threads() as f64;
-        ExecuteReport {
+        Some(ExecuteReport {
             cameras: pass.cameras.len(),
             patches: pass.patches.len(),
             batches: u64::from(batches),
             projections: parts.iter().map(|p| p.surfels).sum(),
             cull_ms: Some(parts.iter().map(|p| p.nanoseconds).sum::<u64>() as f64 * 1e-6 / threads),
             ..ExecuteReport::default()
-        }
+        })
     }
 
     pub(super) fn rows(&self) -> &[Row] {
@@ -193,7 +214,14 @@ impl Records {
 }
 
 impl Part {
-    fn fill(&mut self, pass: &SplatPass<'_>, first: usize, cameras: &[CameraInstance]) {
+    fn fill(
+        &mut self,
+        pass: &SplatPass<'_>,
+        first: usize,
+        cameras: &[CameraInstance],
+        rows: &AtomicUsize,
+        most: usize,
+    ) {
         let start = Instant::now();
         self.batches.clear();
         self.single.clear();
@@ -201,15 +229,24 @@ impl Part {
         self.surfels = 0;
         let mut list = std::mem::take(&mut self.list);
         for (i, camera) in cameras.iter().enumerate() {
+            if rows.load(Ordering::Relaxed) > most {
+                break;
+            }
             list.clear();
+            let before = self.rows();
             pass.batches.cull(camera, &mut list);
             self.surfels += list.iter().map(|b| u64::from(b.count)).sum::<u64>();
             for several in [false, true] {
                 self.run(index(first + i), several, &list);
             }
+            rows.fetch_add(self.rows() - before, Ordering::Relaxed);
         }
         self.list = list;
         self.nanoseconds = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+    }
+
+    fn rows(&self) -> usize {
+        self.batches.len() + self.single.len() + self.several.len()
     }
 
     /// Numbers the surfels of a camera's batches that may have `several` images, or not, and cuts them into chunks.

@@ -68,7 +68,9 @@ fn drawn(scene: &PreparedScene, pass: &SplatPass<'_>) -> Option<Vec<Drawn>> {
         }";
     let gpu = device()?;
     let mut records = Records::default();
-    records.fill(pass, &seen(scene));
+    records.fill(pass, &seen(scene), u32::MAX).expect("few rows");
+    let few = records.chunks().all() / 2;
+    assert!(Records::default().fill(pass, &seen(scene), few).is_none(), "too many are noticed");
     let text = shaders::projection_for_tests(SplatShape::Ellipse) + ENTRY;
     let chunks = records.chunks().all().min(2000);
     let frame = records.frame(0, false);
