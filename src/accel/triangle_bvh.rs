@@ -69,6 +69,7 @@ pub(crate) struct Obstacle {
 /// A tree over triangles in scene space. Both sides of a triangle are hit; degenerate ones never are.
 ///
 /// Of triangles met at the same t the lowest index counts, so that results do not depend on the tree.
+#[derive(Clone)]
 pub struct TriangleBvh {
     tree: CwBvh,
     /// In the order of the tree, scaled.

@@ -1,6 +1,8 @@
 //! A scene made ready to be rendered: surfels in leaf order, trees, triangles. Everything a frame depends on
 //! besides the eye and its parameters.
 
+mod place;
+
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -9,7 +11,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 
 use super::description::{Environment, EyeDescription, Light, Mirror, Paint, Scene};
-use super::{sample, shade};
+use super::sample;
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
 use crate::camera::eye::ImageSize;
 use crate::camera::{Eye, MirrorTriangle};
@@ -126,23 +128,6 @@ impl Cloud {
             bounds: Aabb::EMPTY,
         }
     }
-
-    fn place(&mut self, to_scene: Similarity) {
-        let local = self.tree.bounds();
-        let corner = |i: u32| {
-            let pick = |bit: u32, lo: f32, hi: f32| if i >> bit & 1 == 0 { lo } else { hi };
-            DVec3::new(
-                pick(0, local.min.x, local.max.x).into(),
-                pick(1, local.min.y, local.max.y).into(),
-                pick(2, local.min.z, local.max.z).into(),
-            )
-        };
-        let bounds = Aabb::of((0..8).map(|i| to_scene.point(corner(i)).as_vec3()));
-        // The corners were rounded.
-        let slack = (bounds.min.abs().max(bounds.max.abs())) * (2.0 * f32::EPSILON);
-        self.bounds = Aabb { min: bounds.min - slack, max: bounds.max + slack };
-        self.to_scene = to_scene;
-    }
 }
 
 impl PreparedObject {
@@ -162,7 +147,8 @@ impl PreparedObject {
     }
 }
 
-/// See the module. Scene space is world space less `origin`.
+/// See the module. Scene space is world space less `origin`. A copy has surfels and trees of its own.
+#[derive(Clone)]
 pub struct PreparedScene {
     /// As in the scene.
     pub name: String,
@@ -191,9 +177,9 @@ pub struct PreparedScene {
     pub times: PrepareTimes,
     /// Another number for other surfels or other light on them, over all scenes of the program.
     pub surfel_version: u64,
-    /// Another number for other places of objects, likewise.
+    /// Another number for other places of objects or mirrors, likewise.
     pub placement_version: u64,
-    /// How many trees were built since this scene was prepared: moving objects builds none.
+    /// How many trees over surfels were built since this scene was prepared: moving objects and mirrors builds none.
     pub tree_builds: usize,
 }
 
@@ -279,7 +265,7 @@ impl PreparedScene {
             name: scene.name.clone(),
             origin,
             eye: scene.eye,
-            mirrors: prepare_mirrors(scene, origin),
+            mirrors: unplaced_mirrors(scene),
             tree_builds: clouds.len(),
             objects,
             clouds,
@@ -292,18 +278,12 @@ impl PreparedScene {
             surfel_version: 0,
             placement_version: 0,
         };
-        let corners: Vec<[Vec3; 3]> = prepared
-            .mirrors
-            .iter()
-            .flat_map(|m| m.mesh.triangles().iter().map(|t| t.map(|i| m.positions[i as usize])))
-            .collect();
-        prepared.mirror_triangles = TriangleBvh::build(&corners);
+        for (i, mirror) in scene.mirrors.iter().enumerate() {
+            prepared.set_mirror(i, &mirror.transform);
+        }
+        prepared.build_mirror_triangles();
         for (i, object) in scene.objects.iter().enumerate() {
             prepared.place(i, &object.transform);
-        }
-        for (cloud, mirror) in prepared.clouds[scene.objects.len()..].iter_mut().zip(&scene.mirrors)
-        {
-            cloud.place(from_origin(&mirror.transform, origin));
         }
         prepared.average();
         Ok(prepared)
@@ -319,43 +299,6 @@ impl PreparedScene {
     pub fn eye_of(&self, eye: &EyeDescription, size: ImageSize) -> Option<Eye> {
         let EyeDescription { position, target, up, fov_y } = *eye;
         Eye::new(position - self.origin, target - self.origin, up, fov_y, size)
-    }
-
-    /// Moves an object (object space to world). Its surfels and tree stay as they are; call
-    /// [`PreparedScene::shade`] when light and shadows should follow.
-    pub fn place(&mut self, object: usize, transform: &Similarity) {
-        self.placement_version = another_version();
-        let to_scene = from_origin(transform, self.origin);
-        self.clouds[object].place(to_scene);
-        let object = &mut self.objects[object];
-        object.to_scene = to_scene;
-        object.positions = to_scene_positions(&object.mesh, &to_scene);
-    }
-
-    /// Rebuilds the triangles' BVH from the objects' places and shades all surfels.
-    ///
-    /// # Errors
-    /// Cancelled.
-    pub fn shade(&mut self, cx: &Context) -> Result<()> {
-        let corners: Vec<[Vec3; 3]> = self
-            .objects
-            .iter()
-            .flat_map(|o| o.mesh.triangles().iter().map(|t| t.map(|i| o.positions[i as usize])))
-            .collect();
-        self.triangles = TriangleBvh::build(&corners);
-        for cloud in &self.clouds[..self.objects.len()] {
-            let range = cloud.surfels.start as usize..cloud.surfels.end as usize;
-            shade::bake(
-                &mut self.surfels,
-                range,
-                &cloud.to_scene,
-                &self.triangles,
-                &self.light,
-                cx,
-            )?;
-        }
-        self.average();
-        Ok(())
     }
 
     /// Gives the representatives the colours of what they stand for.
@@ -460,34 +403,22 @@ pub(super) fn sample_mirrors(
     scene.mirrors.iter().zip(counts).map(of).collect()
 }
 
-fn from_origin(transform: &Similarity, origin: DVec3) -> Similarity {
-    Similarity { translation: transform.translation - origin, ..*transform }
-}
-
-fn prepare_mirrors(scene: &Scene, origin: DVec3) -> Vec<PreparedMirror> {
+/// Mirrors without positions and normals.
+fn unplaced_mirrors(scene: &Scene) -> Vec<PreparedMirror> {
     let mut first_triangle = 0;
-    scene
-        .mirrors
-        .iter()
-        .map(|m| {
-            let to_scene = from_origin(&m.transform, origin);
-            let mirror = PreparedMirror {
-                name: m.name.clone(),
-                mesh: Arc::clone(&m.mesh),
-                positions: to_scene_positions(&m.mesh, &to_scene),
-                normals: m
-                    .mesh
-                    .normals()
-                    .iter()
-                    .map(|n| to_scene.direction(n.as_dvec3()).as_vec3())
-                    .collect(),
-                tint: m.tint,
-                first_triangle,
-            };
-            first_triangle += index(m.mesh.triangles().len());
-            mirror
-        })
-        .collect()
+    let unplaced = |m: &Mirror| {
+        let mirror = PreparedMirror {
+            name: m.name.clone(),
+            mesh: Arc::clone(&m.mesh),
+            positions: Vec::new(),
+            normals: Vec::new(),
+            tint: m.tint,
+            first_triangle,
+        };
+        first_triangle += index(m.mesh.triangles().len());
+        mirror
+    };
+    scene.mirrors.iter().map(unplaced).collect()
 }
 
 /// The middle of the mirrors' box, rounded to what f32 holds exactly near it.
@@ -501,10 +432,6 @@ fn mirror_center(scene: &Scene) -> DVec3 {
     }
     let center = (min + max) * 0.5;
     if center.is_finite() { center.round() } else { DVec3::ZERO }
-}
-
-fn to_scene_positions(mesh: &Mesh, to_scene: &Similarity) -> Vec<Vec3> {
-    mesh.positions().iter().map(|p| to_scene.point(p.as_dvec3()).as_vec3()).collect()
 }
 
 fn append(all: &mut Surfels, own: Surfels) {

@@ -1,4 +1,4 @@
-//! Moving an object builds nothing anew and leaves no trace of where it was before.
+//! Moving an object or a mirror builds nothing anew and leaves no trace of where it was before.
 
 use std::sync::Arc;
 
@@ -6,11 +6,12 @@ use catoptric::Context;
 use catoptric::geometry::{Mesh, Similarity};
 use catoptric::image::Picture;
 use catoptric::scene::PreparedScene;
-use catoptric::scene::description::Scene;
-use glam::DVec3;
+use catoptric::scene::description::{Mirror, Scene};
+use glam::{DVec3, Vec3};
 
 use super::{
-    BLUE, GREY, RED, looks, moved, object, prepared, rendered, scene, shape, share_within, turned,
+    BLUE, GREY, RED, looks, moved, object, prepared, rendered, rendered_with, scene, shape,
+    share_within, turned,
 };
 
 const SURFELS: usize = 40_000;
@@ -133,4 +134,82 @@ fn growing_is_as_exact_as_moving() {
     let after = picture(&growing);
     assert!(after == picture(&alone(1.4)));
     assert!(share_within(&after, &before, CLOSE) < 0.97, "the growth is not seen");
+}
+
+/// A ball and a torus as mirrors, the torus where `place` says, with a ground and a cube.
+fn two_mirrors(place: Similarity) -> Scene {
+    let ground = Similarity { scale: 6.0, ..Similarity::IDENTITY };
+    let objects = vec![
+        object("ground", shape("ground", 2), ground, GREY),
+        object("cube", shape("cube", 12), moved(DVec3::new(-0.9, 0.0, 0.6)), BLUE),
+    ];
+    let ball = (shape("sphere", 2000), moved(DVec3::new(0.0, 0.6, 0.0)));
+    let mut scene =
+        scene(ball, objects, looks(DVec3::new(0.3, 1.4, 2.8), DVec3::new(0.1, 0.5, 0.0)));
+    scene.mirrors.push(Mirror {
+        name: "torus".into(),
+        mesh: shape("torus", 1000),
+        transform: place,
+        tint: Vec3::new(0.9, 0.8, 0.7),
+    });
+    scene
+}
+
+/// The torus's places, first and last; the middle of all mirrors is the same to the next unit.
+fn mirror_places() -> [Similarity; 2] {
+    let small = |place: Similarity| Similarity { scale: 0.4, ..place };
+    [
+        small(moved(DVec3::new(0.7, 0.5, 0.6))),
+        small(turned(DVec3::new(1.0, 2.0, -0.5), 67.0, DVec3::new(-0.3, 0.75, 0.9))),
+    ]
+}
+
+#[test]
+fn a_moved_mirror_is_as_if_it_had_always_been_there() {
+    let [first, last] = mirror_places();
+    let mut moving = prepared(&two_mirrors(first), SURFELS);
+    let fresh = prepared(&two_mirrors(last), SURFELS);
+    assert_eq!(moving.origin, fresh.origin, "a coarser rounding would be no fault");
+    let (builds, places) = (moving.tree_builds, moving.placement_version);
+    let surfels = moving.surfels.clone();
+    let pictures = |scene: &PreparedScene| {
+        let triangles = rendered_with(scene, "c3rc", &[("cameras", "triangles")], 160, 90);
+        [picture(scene), triangles.0, rendered(scene, "raytrace", 160, 90).0]
+    };
+    let before = pictures(&moving);
+    moving.place_mirror(1, &last);
+    let after = pictures(&moving);
+    assert!(after == pictures(&fresh), "the path left a trace");
+    for (after, before) in after.iter().zip(&before) {
+        assert!(share_within(after, before, CLOSE) < 0.93, "the move is not seen");
+    }
+    assert_eq!(moving.tree_builds, builds);
+    assert_ne!(moving.placement_version, places);
+    assert!(moving.surfels.x == surfels.x && moving.surfels.radiance == surfels.radiance);
+
+    for step in 1..20_u32 {
+        let t = f64::from(step);
+        moving.place_mirror(1, &turned(DVec3::new(1.0, t, 0.2), 40.0 * t, DVec3::new(t, 0.0, -t)));
+    }
+    moving.place_mirror(1, &first);
+    assert!(pictures(&moving) == before, "to and fro is not as if it had stayed");
+    assert_eq!(moving.mirror_clearance(), prepared(&two_mirrors(first), 100).mirror_clearance());
+    assert_eq!(moving.tree_builds, builds);
+}
+
+#[test]
+fn a_copy_goes_its_own_way() {
+    let [first, last] = places();
+    let mut own = prepared(&knot_near_a_ball(first), SURFELS);
+    let before = picture(&own);
+    let mut copy = own.clone();
+    assert!(picture(&copy) == before);
+    assert_eq!(copy.surfel_version, own.surfel_version, "the same surfels so far");
+    copy.place(2, &last);
+    copy.shade(&Context::default()).unwrap();
+    assert!(picture(&own) == before, "the copy is moved, not what it was made of");
+    own.place(2, &last);
+    own.shade(&Context::default()).unwrap();
+    assert_ne!(copy.surfel_version, own.surfel_version);
+    assert!(picture(&copy) == picture(&own));
 }

@@ -220,7 +220,7 @@ fn frames_on_a_given_device_make_no_buffers() {
 }
 
 #[test]
-fn moved_objects_and_scenes_without_triangles() {
+fn moved_things_and_scenes_without_triangles() {
     if device().is_none() {
         return;
     }
@@ -229,17 +229,29 @@ fn moved_objects_and_scenes_without_triangles() {
     let c3rc = method("c3rc").expect("it is there");
     let params = Params::defaults(c3rc.info().params);
     let eye = scene.eye_for(SIZE).expect("a view");
-    for moved in [false, true] {
-        if moved {
-            let to = Similarity { translation: DVec3::new(-0.3, 0.6, 1.2), ..Similarity::IDENTITY };
-            scene.place(1, &Similarity { scale: 0.5, ..to });
-            scene.shade(&Context::default()).expect("no one cancels");
+    let to = |x, y, z, scale| Similarity {
+        translation: DVec3::new(x, y, z),
+        scale,
+        ..Similarity::IDENTITY
+    };
+    let mut last: Option<Picture> = None;
+    for moved in ["nothing", "object", "mirror"] {
+        match moved {
+            "object" => {
+                scene.place(1, &to(-0.3, 0.6, 1.2, 0.5));
+                scene.shade(&Context::default()).expect("no one cancels");
+            }
+            "mirror" => scene.place_mirror(1, &to(0.5, 0.9, 1.0, 0.6)),
+            _ => {}
         }
         renderer
             .render(&scene, &eye, c3rc, &params, false, &Context::default())
             .unwrap_or_else(|e| panic!("{e}"));
         let (cpu, _) = picture(Box::new(Cpu::default()), &scene, false);
         verdict(&cpu.rgb, &renderer.picture().rgb).unwrap_or_else(|e| panic!("{moved}: {e}"));
+        if let Some(last) = last.replace(cpu.clone()) {
+            assert!(verdict(&last.rgb, &cpu.rgb).is_err(), "{moved}: the move is not seen");
+        }
     }
     let points: Vec<Vec3> = (0u16..10_000)
         .map(|i| Vec3::new(f32::from(i % 100) * 0.02 - 1.0, -0.3, f32::from(i / 100) * 0.02 - 1.0))
