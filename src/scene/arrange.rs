@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
 
-use super::description::{EyeDescription, Mirror, Object, Paint, PatternKind, Scene};
+use super::description::{EyeDescription, Mirror, Object, Paint, PatternKind, Scene, Source};
 use super::file::{self, DEFAULT_FOV_Y_DEG, DEFAULT_SKY, PARALLEL, default_light, plain_paint};
 use super::fit::{fit, world_bounds};
 use super::library::{Library, stem, unique};
@@ -63,15 +63,17 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
     }
     for input in &request.mirrors {
         let spot = (MIRROR_DIAGONAL, DVec3::ZERO);
-        let (mesh, transform, name) = placed("--mirror", input, spot, &mut library)?;
+        let Placed { mesh, source, transform, name } =
+            placed("--mirror", input, spot, &mut library)?;
         let name = new_name(&scene, &name);
-        scene.mirrors.push(Mirror { name, mesh, transform, tint: Vec3::ONE });
+        scene.mirrors.push(Mirror { name, mesh, source, transform, tint: Vec3::ONE });
     }
     for input in &request.objects {
         let spot = (OBJECT_DIAGONAL, BESIDE);
-        let (mesh, transform, name) = placed("--object", input, spot, &mut library)?;
+        let Placed { mesh, source, transform, name } =
+            placed("--object", input, spot, &mut library)?;
         let (name, paint) = (new_name(&scene, &name), plain_paint(&mesh));
-        scene.objects.push(Object { name, mesh, transform, paint, density: 1.0 });
+        scene.objects.push(Object { name, mesh, source, transform, paint, density: 1.0 });
     }
     override_eye(&mut scene.eye, request)?;
     Ok(scene)
@@ -139,26 +141,37 @@ fn bare(name: &str) -> Scene {
 /// The mirror where none is asked for.
 fn teapot(library: &mut Library) -> Result<Mirror> {
     let spot = (MIRROR_DIAGONAL, DVec3::ZERO);
-    let (mesh, transform, name) = placed("--mirror", "teapot", spot, library)?;
-    Ok(Mirror { name, mesh, transform, tint: Vec3::ONE })
+    let Placed { mesh, source, transform, name } = placed("--mirror", "teapot", spot, library)?;
+    Ok(Mirror { name, mesh, source, transform, tint: Vec3::ONE })
 }
 
-/// A file as placed, or a built-in shape with a diagonal and base; with its plain name.
+/// What becomes a mirror or an object.
+struct Placed {
+    mesh: Arc<Mesh>,
+    source: Option<Source>,
+    transform: Similarity,
+    /// Plain: others may have it, too.
+    name: String,
+}
+
+/// A file as placed, or a built-in shape with a diagonal and base.
 fn placed(
     option: &str,
     input: &str,
     (diagonal, base): (f64, DVec3),
     library: &mut Library,
-) -> Result<(Arc<Mesh>, Similarity, String)> {
+) -> Result<Placed> {
     let path = Path::new(input);
     if !builtin::SHAPES.contains(&input) && (load::is_mesh(path) || path.exists()) {
-        return Ok((library.file(path)?, Similarity::IDENTITY, stem(path)));
+        let (mesh, source) = library.file(path)?;
+        let (transform, name) = (Similarity::IDENTITY, stem(path));
+        return Ok(Placed { mesh, source: Some(source), transform, name });
     }
-    let mesh = library.shape(input, None, |problem, remedy| {
+    let (mesh, source) = library.shape(input, None, |problem, remedy| {
         Error::input(option, "", problem, format!("{remedy}; files end in .obj or .ply"))
     })?;
     let transform = fit(&mesh, DQuat::IDENTITY, diagonal, base);
-    Ok((mesh, transform, input.to_owned()))
+    Ok(Placed { mesh, source: Some(source), transform, name: input.to_owned() })
 }
 
 /// A name that nothing in the scene has.
@@ -177,7 +190,8 @@ fn beside_teapot(models: &[String], library: &mut Library) -> Result<Scene> {
 
     for (i, model) in models.iter().enumerate() {
         let path = Path::new(model);
-        let mesh = library.file(path)?;
+        let (mesh, source) = library.file(path)?;
+        let source = Some(source);
         let mut transform = fit(&mesh, DQuat::IDENTITY, OBJECT_DIAGONAL, BESIDE);
         let mut disc = Disc::around(&mesh, &transform);
         if i > 0 {
@@ -190,7 +204,7 @@ fn beside_teapot(models: &[String], library: &mut Library) -> Result<Scene> {
             _ => Paint::Constant(MODEL_COLORS[i % MODEL_COLORS.len()]),
         };
         let name = new_name(&scene, &stem(path));
-        scene.objects.push(Object { name, mesh, transform, paint, density: 1.0 });
+        scene.objects.push(Object { name, mesh, source, transform, paint, density: 1.0 });
     }
     let things = scene.objects.iter().map(|o| (&o.mesh, &o.transform));
     let boxes: Vec<_> = things.map(|(mesh, transform)| world_bounds(mesh, transform)).collect();
@@ -214,13 +228,14 @@ fn narrow(x: f64) -> f32 {
 
 /// The checkered ground, grown if it would end less than `radius` from the origin.
 fn ground(radius: f64, library: &mut Library) -> Result<Object> {
-    let mesh = library.shape("ground", None, |p, r| Error::input("ground", "", p, r))?;
+    let (mesh, source) = library.shape("ground", None, |p, r| Error::input("ground", "", p, r))?;
     let half = f64::from(mesh.bounds().extent().x.min(mesh.bounds().extent().z)) * 0.5;
     let transform = Similarity { scale: (radius / half).max(1.0), ..Similarity::IDENTITY };
     let colors = [Vec3::splat(0.72), Vec3::new(0.16, 0.17, 0.20)];
     let period = narrow(GROUND_PERIOD / transform.scale);
     let paint = Paint::Pattern { kind: PatternKind::Checker, colors, period };
-    Ok(Object { name: String::new(), mesh, transform, paint, density: 1.0 })
+    let source = Some(source);
+    Ok(Object { name: String::new(), mesh, source, transform, paint, density: 1.0 })
 }
 
 /// What a thing stands on: y is 0.

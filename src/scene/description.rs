@@ -1,5 +1,6 @@
 //! A scene as its author means it: meshes, colours, transforms, eye and light. Nothing is prepared yet.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
@@ -45,6 +46,20 @@ impl EyeDescription {
     }
 }
 
+/// Where a mesh comes from: what a scene file has to say to get it again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A file of its own, by its absolute path.
+    File(PathBuf),
+    /// A built-in shape, see [`builtin::shape`](super::builtin::shape).
+    Shape {
+        /// Its name.
+        name: String,
+        /// About how many triangles, if that was said.
+        triangles: Option<usize>,
+    },
+}
+
 /// A perfectly specular mesh with smooth normals.
 #[derive(Clone, Debug)]
 pub struct Mirror {
@@ -52,6 +67,8 @@ pub struct Mirror {
     pub name: String,
     /// Local space.
     pub mesh: Arc<Mesh>,
+    /// Where the mesh comes from; `None` if it was given in code.
+    pub source: Option<Source>,
     /// Local to world.
     pub transform: Similarity,
     /// Linear RGB factor of what is reflected.
@@ -65,6 +82,8 @@ pub struct Object {
     pub name: String,
     /// Local space.
     pub mesh: Arc<Mesh>,
+    /// Where the mesh comes from; `None` if it was given in code.
+    pub source: Option<Source>,
     /// Local to world.
     pub transform: Similarity,
     /// Its colour.

@@ -1,4 +1,4 @@
-//! Scene files: TOML to [`Scene`]. The grammar is in `grammar.rs`; unknown keys are errors.
+//! Scene files: TOML to [`Scene`], and back ([`to_toml`]). The grammar is in `grammar.rs`; unknown keys are errors.
 //!
 //! ```toml
 //! name = "default"
@@ -45,13 +45,16 @@ use super::description::{
     Environment, EyeDescription, Light, Mirror, Object, Paint, PatternKind, Scene,
 };
 use super::fit::fit;
-use super::library::{Library, stem, unique};
+use super::library::{Found, Library, stem, unique};
 use super::load;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, Similarity};
 
 mod grammar;
+mod write;
+
+pub use write::{to_toml, write};
 
 use grammar::{
     Color, EnvironmentName, EnvironmentTable, EyeTable, FitTable, LightTable, MirrorTable, Name,
@@ -97,7 +100,7 @@ pub fn read(path: &Path, cx: &Context) -> Result<Scene> {
 /// # Errors
 /// [`Error::Input`] with the line if the text is not a scene, or from a mesh file; [`Error::Cancelled`].
 pub fn parse(text: &str, name: &str, folder: &Path, cx: &Context) -> Result<Scene> {
-    let source = Source { text, name, folder };
+    let source = Text { text, name, folder };
     let table: SceneTable = toml::from_str(text).map_err(|e| {
         let message = e.message().trim().replace('\n', " ");
         source.error(e.span().map_or(0, |s| s.start), message, "correct this line")
@@ -114,11 +117,12 @@ pub fn parse(text: &str, name: &str, folder: &Path, cx: &Context) -> Result<Scen
     for spanned in &table.mirror {
         let at = spanned.span().start;
         let table = spanned.get_ref();
-        let mesh = source.mesh(at, Thing::from(table), &mut library)?;
+        let (mesh, from) = source.mesh(at, Thing::from(table), &mut library)?;
         mirrors.push(Mirror {
             name: next_name(),
             transform: source.transform(at, &Thing::from(table), &mesh)?,
             mesh,
+            source: Some(from),
             tint: table.tint.map_or(Vec3::ONE, |c| c.0),
         });
     }
@@ -126,13 +130,14 @@ pub fn parse(text: &str, name: &str, folder: &Path, cx: &Context) -> Result<Scen
     for spanned in &table.object {
         let at = spanned.span().start;
         let table = spanned.get_ref();
-        let mesh = source.mesh(at, Thing::from(table), &mut library)?;
+        let (mesh, from) = source.mesh(at, Thing::from(table), &mut library)?;
         objects.push(Object {
             name: next_name(),
             transform: source.transform(at, &Thing::from(table), &mesh)?,
             paint: source.paint(at, table, &mesh)?,
             density: table.density.map_or(1.0, |d| d.0),
             mesh,
+            source: Some(from),
         });
     }
     Ok(Scene {
@@ -151,7 +156,7 @@ pub(super) fn plain_paint(mesh: &Mesh) -> Paint {
 }
 
 /// A name for each mirror, then for each object, all different.
-fn names(source: &Source, table: &SceneTable) -> Result<Vec<String>> {
+fn names(source: &Text, table: &SceneTable) -> Result<Vec<String>> {
     let mirrors = table.mirror.iter().map(|m| (m.span().start, Thing::from(m.get_ref())));
     let objects = table.object.iter().map(|o| (o.span().start, Thing::from(o.get_ref())));
     let things: Vec<(usize, Thing)> = mirrors.chain(objects).collect();
@@ -225,13 +230,13 @@ thing_from!(ObjectTable);
 
 /// The text and where it comes from.
 #[derive(Clone, Copy)]
-struct Source<'a> {
+struct Text<'a> {
     text: &'a str,
     name: &'a str,
     folder: &'a Path,
 }
 
-impl Source<'_> {
+impl Text<'_> {
     /// An error at a byte of the text.
     fn error(&self, at: usize, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         let before = &self.text.as_bytes()[..at.min(self.text.len())];
@@ -283,7 +288,7 @@ impl Source<'_> {
         }
     }
 
-    fn mesh(&self, at: usize, thing: Thing, library: &mut Library) -> Result<std::sync::Arc<Mesh>> {
+    fn mesh(&self, at: usize, thing: Thing, library: &mut Library) -> Result<Found> {
         match (thing.shape, thing.file) {
             (Some(shape), None) => {
                 library.shape(shape, thing.triangles.map(|t| t.0), |problem, remedy| {

@@ -54,12 +54,14 @@ impl PreparedScene {
             mirrors: vec![Mirror {
                 name: "mirror".into(),
                 mesh: Arc::new(mirror),
+                source: None,
                 transform: Similarity::IDENTITY,
                 tint: Vec3::ONE,
             }],
             objects: vec![Object {
                 name: NAME.into(),
                 mesh: Arc::new(Mesh::none()),
+                source: None,
                 transform: Similarity::IDENTITY,
                 paint: Paint::Constant(Vec3::ONE),
                 density: 1.0,

@@ -1,8 +1,9 @@
 //! Meshes by name or file, each made once and shared.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
+use super::description::Source;
 use super::{builtin, load};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -11,14 +12,11 @@ use crate::geometry::Mesh;
 /// Makes meshes and remembers them.
 pub(super) struct Library<'a> {
     cx: &'a Context,
-    meshes: Vec<(Source, Arc<Mesh>)>,
+    meshes: Vec<Found>,
 }
 
-#[derive(PartialEq)]
-enum Source {
-    File(PathBuf),
-    Shape(String, Option<usize>),
-}
+/// A mesh and where it comes from.
+pub(super) type Found = (Arc<Mesh>, Source);
 
 impl<'a> Library<'a> {
     pub(super) fn new(cx: &'a Context) -> Self {
@@ -26,7 +24,7 @@ impl<'a> Library<'a> {
     }
 
     /// The mesh in a file.
-    pub(super) fn file(&mut self, path: &Path) -> Result<Arc<Mesh>> {
+    pub(super) fn file(&mut self, path: &Path) -> Result<Found> {
         // If it cannot be resolved, reading it says why.
         let resolved = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let cx = self.cx;
@@ -39,8 +37,8 @@ impl<'a> Library<'a> {
         name: &str,
         triangles: Option<usize>,
         unknown: impl FnOnce(String, String) -> Error,
-    ) -> Result<Arc<Mesh>> {
-        self.get(Source::Shape(name.to_owned(), triangles), || {
+    ) -> Result<Found> {
+        self.get(Source::Shape { name: name.to_owned(), triangles }, || {
             builtin::shape(name, triangles).ok_or_else(|| {
                 let problem = format!("there is no built-in shape \"{name}\"");
                 unknown(problem, format!("the shapes are {}", builtin::SHAPES.join(", ")))
@@ -48,13 +46,13 @@ impl<'a> Library<'a> {
         })
     }
 
-    fn get(&mut self, source: Source, make: impl FnOnce() -> Result<Mesh>) -> Result<Arc<Mesh>> {
-        if let Some((_, mesh)) = self.meshes.iter().find(|(s, _)| *s == source) {
-            return Ok(Arc::clone(mesh));
+    fn get(&mut self, source: Source, make: impl FnOnce() -> Result<Mesh>) -> Result<Found> {
+        if let Some((mesh, _)) = self.meshes.iter().find(|(_, s)| *s == source) {
+            return Ok((Arc::clone(mesh), source));
         }
         let mesh = Arc::new(make()?);
-        self.meshes.push((source, Arc::clone(&mesh)));
-        Ok(mesh)
+        self.meshes.push((Arc::clone(&mesh), source.clone()));
+        Ok((mesh, source))
     }
 }
 

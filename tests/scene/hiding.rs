@@ -27,6 +27,7 @@ fn two_mirrors() -> PreparedScene {
     scene.mirrors.push(Mirror {
         name: "small".into(),
         mesh: shape("torus", 2000),
+        source: None,
         transform: moved(DVec3::new(-0.6, -0.1, 1.2)),
         tint: Vec3::ONE,
     });

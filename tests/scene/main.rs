@@ -47,7 +47,7 @@ fn turned(axis: DVec3, degrees: f64, translation: DVec3) -> Similarity {
 }
 
 fn object(name: &str, mesh: Arc<Mesh>, transform: Similarity, paint: Paint) -> Object {
-    Object { name: name.into(), mesh, transform, paint, density: 1.0 }
+    Object { name: name.into(), mesh, source: None, transform, paint, density: 1.0 }
 }
 
 /// A scene under a plain sky, with one mirror without a tint.
@@ -56,7 +56,13 @@ fn scene(mirror: (Arc<Mesh>, Similarity), objects: Vec<Object>, eye: EyeDescript
     Scene {
         name: "test".into(),
         eye,
-        mirrors: vec![Mirror { name: "mirror".into(), mesh, transform, tint: Vec3::ONE }],
+        mirrors: vec![Mirror {
+            name: "mirror".into(),
+            mesh,
+            source: None,
+            transform,
+            tint: Vec3::ONE,
+        }],
         objects,
         environment: Environment::Constant(Vec3::new(0.4, 0.5, 0.6)),
         light: Light {

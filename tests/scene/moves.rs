@@ -149,6 +149,7 @@ fn two_mirrors(place: Similarity) -> Scene {
     scene.mirrors.push(Mirror {
         name: "torus".into(),
         mesh: shape("torus", 1000),
+        source: None,
         transform: place,
         tint: Vec3::new(0.9, 0.8, 0.7),
     });

@@ -44,6 +44,7 @@ fn scene(environment: Environment) -> PreparedScene {
     let object = |name: &str, mesh, transform, paint| Object {
         name: name.into(),
         mesh,
+        source: None,
         transform,
         paint,
         density: 1.0,
@@ -64,6 +65,7 @@ fn scene(environment: Environment) -> PreparedScene {
     let mirror = |name: &str, transform, tint| Mirror {
         name: name.into(),
         mesh: shape(name),
+        source: None,
         transform,
         tint,
     };

@@ -35,6 +35,7 @@ pub(super) fn scene(shape: &str) -> PreparedScene {
     let object = |name: &str, transform, color| Object {
         name: name.into(),
         mesh: mesh(name, 2000),
+        source: None,
         transform,
         paint: Paint::Constant(color),
         density: 1.0,
@@ -42,6 +43,7 @@ pub(super) fn scene(shape: &str) -> PreparedScene {
     let mirror = |name: &str, triangles, transform| Mirror {
         name: name.into(),
         mesh: mesh(name, triangles),
+        source: None,
         transform,
         tint: Vec3::ONE,
     };
