@@ -23,10 +23,16 @@ impl<'a> Culler<'a> {
     }
 }
 
-impl BatchSource for Culler<'_> {
-    fn cull(&self, camera: &CameraInstance, out: &mut Vec<Batch>) {
+impl Culler<'_> {
+    /// Whether it walks at all: without a test objects are taken whole.
+    pub(crate) fn tests(&self) -> bool {
+        self.test != BoxTest::None
+    }
+
+    /// The walk for one camera.
+    pub(crate) fn walk<'b>(&'b self, camera: &'b CameraInstance) -> Walk<'b> {
         let object = &self.scene.clouds[camera.object as usize];
-        let walk = Walk {
+        Walk {
             wide: object.tree.wide(),
             test: self.test,
             lambda: camera.lambda,
@@ -36,9 +42,16 @@ impl BatchSource for Culler<'_> {
             gaze: camera.gaze.filter(|_| camera.detail > 0.0),
             axis: camera.camera.axis,
             per_pixel: camera.detail * std::f32::consts::FRAC_PI_2,
-        };
+        }
+    }
+}
+
+impl BatchSource for Culler<'_> {
+    fn cull(&self, camera: &CameraInstance, out: &mut Vec<Batch>) {
+        let object = &self.scene.clouds[camera.object as usize];
+        let walk = self.walk(camera);
         let from = out.len();
-        if self.test == BoxTest::None {
+        if !self.tests() {
             for first in object.surfels.clone().step_by(WHOLE_BATCH as usize) {
                 let count = (object.surfels.end - first).min(WHOLE_BATCH);
                 out.push(Batch { first, count, stride: 1, lambda: camera.lambda, roots: 1 });
@@ -60,7 +73,8 @@ impl BatchSource for Culler<'_> {
 /// Without a test, objects are cut into batches of so many surfels.
 const WHOLE_BATCH: u32 = 1 << 12;
 
-struct Walk<'a> {
+/// See [`Culler::walk`].
+pub(crate) struct Walk<'a> {
     wide: &'a [WideNode],
     test: BoxTest,
     lambda: [f32; 2],
@@ -76,12 +90,23 @@ struct Walk<'a> {
 
 /// A subtree that may meet the volume; `child` = 0: to be taken whole.
 #[derive(Clone, Copy, Default)]
-struct Open {
-    child: u32,
-    first: u32,
-    count: u32,
-    stride: u32,
-    lambda: [f32; 2],
+pub(crate) struct Open {
+    pub(crate) child: u32,
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    pub(crate) stride: u32,
+    pub(crate) lambda: [f32; 2],
+}
+
+/// What becomes of a child of a wide node.
+#[derive(Clone, Copy)]
+pub(crate) enum Decision {
+    /// It does not meet the volume.
+    Refused,
+    /// It is hidden: all of it faces away from the rays.
+    TurnedAway,
+    /// It is walked, or taken.
+    Open(Open),
 }
 
 /// Representatives of a level are taken from here on, in shares of the area that they should have at most: each level's
@@ -231,6 +256,33 @@ impl Walk<'_> {
             // Less than eight: parts are not of one size, and these are taken unseen.
             V::<S>::bits(needed.le(seen * 6.0) & real),
         ]
+    }
+}
+
+impl Walk<'_> {
+    /// What [`Walk::run`] makes of the children of a wide node, by slot, for those who want to look on.
+    #[inline(always)]
+    pub(crate) fn decide<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        volume: &ViewVolume<f32, N>,
+        at: u32,
+        lambda: [f32; 2],
+    ) -> Vec<Decision> {
+        let node = &self.wide[at as usize];
+        let tested = test_children(simd, node, volume, self.test, lambda);
+        let away = self.gaze.map_or(0, |gaze| turned_away(simd, node, &gaze));
+        let small = if self.per_pixel > 0.0 { self.small(simd, node, &tested) } else { [0; 4] };
+        let decide = |slot| {
+            if tested.meets >> slot & 1 == 0 {
+                Decision::Refused
+            } else if away >> slot & 1 != 0 {
+                Decision::TurnedAway
+            } else {
+                Decision::Open(self.open(node, at, slot, small, &tested))
+            }
+        };
+        (0..self.used(at)).map(decide).collect()
     }
 }
 

@@ -60,6 +60,7 @@
 //! | [`methods`] | the registry: a method is one file | all above |
 //! | [`backend`] | executes plans, on the CPU or through wgpu (shaders in `shaders/`) | all above but cull and methods |
 //! | [`frame`] | one frame from end to end | all above |
+//! | [`analysis`] | what a frame does, looked at afterwards: one camera's walk, costs by triangle | all above |
 //!
 //! Everything may use [`error`] and [`context`]. `tests/architecture.rs` holds the table.
 //!
@@ -128,6 +129,7 @@
 //! Smaller debts are named where they are used.
 
 pub mod accel;
+pub mod analysis;
 pub mod backend;
 pub mod camera;
 pub mod context;

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Rooms and what they may use besides themselves and [`ANYONE`].
-const ROOMS: [(&str, &[&str]); 11] = [
+const ROOMS: [(&str, &[&str]); 12] = [
     ("geometry", &[]),
     ("image", &[]),
     ("camera", &["geometry"]),
@@ -32,6 +32,22 @@ const ROOMS: [(&str, &[&str]); 11] = [
             "cull",
             "methods",
             "backend",
+        ],
+    ),
+    (
+        "analysis",
+        &[
+            "geometry",
+            "image",
+            "camera",
+            "accel",
+            "scene",
+            "visibility",
+            "plan",
+            "cull",
+            "methods",
+            "backend",
+            "frame",
         ],
     ),
 ];

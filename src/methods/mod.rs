@@ -55,7 +55,7 @@ const MIRROR_OCCLUSION: ParamInfo = ParamInfo {
 };
 
 /// What a word of [`RAY_SCALE`] means.
-fn ray_scale(word: &str) -> RayScale {
+pub(crate) fn ray_scale(word: &str) -> RayScale {
     if word == "unit" { RayScale::Unit } else { RayScale::EyeDistance }
 }
 

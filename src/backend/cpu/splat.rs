@@ -42,7 +42,7 @@ const SHARE: usize = 1 << 15;
 /// Patches that a thread takes at a time at most: neighbours cost much or little together (untuned).
 const PATCHES: usize = 16;
 /// One column and row around the tile takes what a 2 × 2 splat writes beyond it.
-const BORDER: u32 = 1;
+pub(crate) const BORDER: u32 = 1;
 
 /// What the splat pass did, summed over threads.
 #[derive(Clone, Copy, Debug, Default)]

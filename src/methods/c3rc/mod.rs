@@ -16,7 +16,7 @@ use crate::camera::three_ray::BoxTest;
 use crate::cull::Culler;
 use crate::error::{Error, Result};
 use crate::plan::{DepthKey, Pass, Pixels, Plan, SplatPass, SplatShape};
-use crate::scene::prepared::milliseconds;
+use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::{MirrorTriangleIndex, PatchScratch, patches};
 
 /// See the module.
@@ -110,6 +110,21 @@ static INFO: MethodInfo = MethodInfo {
     ],
 };
 
+/// What culls for a frame with these parameters.
+///
+/// # Panics
+/// If they are another method's.
+pub(crate) fn culler<'a>(scene: &'a PreparedScene, params: &Params) -> Culler<'a> {
+    let test = match params.choice("test") {
+        "none" => BoxTest::None,
+        "interval" => BoxTest::Interval,
+        "sweep" => BoxTest::Sweep,
+        "paper" => BoxTest::Paper,
+        _ => BoxTest::Slab,
+    };
+    Culler::new(scene, test)
+}
+
 impl Method for C3rc {
     fn info(&self) -> &'static MethodInfo {
         &INFO
@@ -156,19 +171,12 @@ impl Method for C3rc {
         };
         let (cameras, patch_cameras) = cameras;
         out.times.cameras_ms = milliseconds(start);
-        let test = match params.choice("test") {
-            "none" => BoxTest::None,
-            "interval" => BoxTest::Interval,
-            "sweep" => BoxTest::Sweep,
-            "paper" => BoxTest::Paper,
-            _ => BoxTest::Slab,
-        };
         out.passes.push(Pass::Splat(Box::new(SplatPass {
             patches,
             pixels,
             cameras,
             patch_cameras,
-            batches: Box::new(Culler::new(scene, test)),
+            batches: Box::new(culler(scene, params)),
             shape,
             depth: match params.choice("depth") {
                 "push-back" => DepthKey::PushBack,
