@@ -24,9 +24,22 @@ impl Context {
         Self { cancel: Arc::default(), progress: Some(progress) }
     }
 
+    /// A context without progress that this flag cancels.
+    pub fn cancelled_by(flag: Arc<AtomicBool>) -> Self {
+        Self { cancel: flag, progress: None }
+    }
+
     /// The flag that cancels everything that was given this context.
     pub fn cancel_flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.cancel)
+    }
+
+    /// Whether to go on.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] once the work was cancelled.
+    pub fn check(&self) -> Result<()> {
+        if self.cancel.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
     }
 
     /// Reports that `stage` is at `done` (0 to 1).
@@ -34,9 +47,7 @@ impl Context {
     /// # Errors
     /// [`Error::Cancelled`] once the work was cancelled.
     pub fn step(&self, stage: &str, done: f64) -> Result<()> {
-        if self.cancel.load(Ordering::Relaxed) {
-            return Err(Error::Cancelled);
-        }
+        self.check()?;
         if let Some(progress) = &self.progress {
             progress.report(stage, done);
         }

@@ -146,7 +146,9 @@ impl Renderer {
         let made = method.prepare(scene, params, cx)?;
         let start = Instant::now();
         let ids_ms = self.see(scene, eye);
+        cx.check()?;
         let (mut report, _) = self.reflect(scene, eye, method, &made, params, planes)?;
+        cx.check()?;
         let composite = Instant::now();
         self.compose(scene, eye);
         report.ids_ms = Some(ids_ms);
@@ -216,6 +218,11 @@ impl Renderer {
     /// The picture of the last frame, linear RGB.
     pub fn picture(&self) -> &Picture {
         &self.picture
+    }
+
+    /// What the eye saw directly in the last frame.
+    pub fn visibility(&self) -> &Visibility {
+        &self.visibility
     }
 
     /// What every mirror pixel of the last frame shows, if it was asked for.

@@ -14,7 +14,7 @@
 //!           raytrace  Gather
 //!         backend ─► Reflection                  per mirror pixel: radiance, coverage; on demand what was seen (Planes)
 //!         compose ─► Picture                     environment where nothing landed, tint, antialiased direct view
-//! then    Picture ─► PNG, EXR, HDR     Planes ─► EXR, comparison
+//! then    Picture ─► PNG, EXR, HDR, window     Planes ─► EXR, comparison
 //! ```
 //!
 //! A frame depends on the prepared scene, the eye and the method's parameters, and on nothing else: it has
@@ -61,6 +61,7 @@
 //! | [`backend`] | executes plans, on the CPU or through wgpu (shaders in `shaders/`) | all above but cull and methods |
 //! | [`frame`] | one frame from end to end | all above |
 //! | [`analysis`] | what a frame does, looked at afterwards: one camera's walk, costs by triangle | all above |
+//! | `viewer` (feature `viewer`) | the window: hands in, wishes out; no algorithm | all above |
 //!
 //! Everything may use [`error`] and [`context`]. `tests/architecture.rs` holds the table.
 //!
@@ -141,6 +142,8 @@ pub mod image;
 pub mod methods;
 pub mod plan;
 pub mod scene;
+#[cfg(feature = "viewer")]
+pub mod viewer;
 pub mod visibility;
 
 pub use context::{Context, Progress};

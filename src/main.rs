@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 use catoptric::{Context, Error, Progress};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -14,15 +15,17 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use commands::bench::{BenchArgs, What};
 use commands::render::{HowArgs, RenderArgs};
+#[cfg(feature = "viewer")]
+use commands::view::ViewArgs;
 use commands::{SceneArgs, say, with_method_flags};
 
 /// Accurate reflections on curved mirrors, without ray-tracing hardware
 ///
-/// Without a command: the built-in scene, as a picture.
+/// Without a command: the built-in scene in a window, or as a picture where there is no display.
 #[derive(Parser, Debug)]
 #[command(
     version,
-    after_help = "Try `catoptric render room`, or `catoptric render MODEL.obj` with a model of yours."
+    after_help = "Try `catoptric view room`, or `catoptric render MODEL.obj` with a model of yours."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -31,6 +34,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Verb {
+    #[cfg(feature = "viewer")]
+    View(Box<ViewArgs>),
     Render(Box<RenderArgs>),
     Compare(commands::compare::Args),
     Info(commands::info::InfoArgs),
@@ -38,9 +43,12 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    let started = Instant::now();
     let command = Cli::command()
         .mut_subcommand("render", with_method_flags)
         .mut_subcommand("bench", |bench| bench.mut_subcommand("layer", with_method_flags));
+    #[cfg(feature = "viewer")]
+    let command = command.mut_subcommand("view", with_method_flags);
     let matches = command.get_matches();
     let cli = match Cli::from_arg_matches(&matches) {
         Ok(cli) => cli,
@@ -55,7 +63,7 @@ fn main() -> ExitCode {
             std::process::exit(130);
         }
     });
-    let done = handler.map_err(Into::into).and_then(|()| run(&cli, &matches, &cx));
+    let done = handler.map_err(Into::into).and_then(|()| run(&cli, &matches, started, &cx));
     bars.end();
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -75,9 +83,16 @@ fn complain(message: &str) {
     let _ = writeln!(std::io::stderr(), "{message}");
 }
 
-fn run(cli: &Cli, matches: &clap::ArgMatches, cx: &Context) -> anyhow::Result<()> {
+fn run(
+    cli: &Cli,
+    matches: &clap::ArgMatches,
+    started: Instant,
+    cx: &Context,
+) -> anyhow::Result<()> {
     let verb = matches.subcommand().map(|(_, own)| own);
     match (&cli.command, verb) {
+        #[cfg(feature = "viewer")]
+        (Some(Verb::View(args)), Some(own)) => commands::view::run(args, own, started, cx),
         (Some(Verb::Render(args)), Some(own)) => commands::render::run(args, own, cx),
         (Some(Verb::Compare(args)), _) => commands::compare::run(args.clone()),
         (Some(Verb::Info(args)), _) => commands::info::run(args, cx),
@@ -86,23 +101,24 @@ fn run(cli: &Cli, matches: &clap::ArgMatches, cx: &Context) -> anyhow::Result<()
             let own = own.subcommand().map_or(own, |(_, own)| own);
             commands::bench::layer(layer, own, cx)
         }
-        _ => built_in_scene(cx),
+        _ => built_in_scene(started, cx),
     }
 }
 
 /// What the program does if it is told nothing.
-fn built_in_scene(cx: &Context) -> anyhow::Result<()> {
+fn built_in_scene(started: Instant, cx: &Context) -> anyhow::Result<()> {
+    let nothing = clap::ArgMatches::default();
+    #[cfg(feature = "viewer")]
+    match commands::view::run(&commands::view::ViewArgs::standard(), &nothing, started, cx) {
+        Err(error) if !matches!(error.downcast_ref(), Some(Error::Cancelled)) => {
+            complain(&format!("{error:#}"));
+        }
+        done => return done,
+    }
+    let _ = started;
     let args = RenderArgs {
         scene: SceneArgs::default_scene(),
-        how: HowArgs {
-            method: "c3rc".into(),
-            backend: "auto".into(),
-            adapter: None,
-            gpu_path: "compute".into(),
-            stats: false,
-            preset: None,
-            quality: "default".into(),
-        },
+        how: HowArgs::standard(),
         output: "catoptric.png".into(),
         aov: None,
         json: None,
@@ -110,8 +126,8 @@ fn built_in_scene(cx: &Context) -> anyhow::Result<()> {
         frames: None,
         orbit: 360.0,
     };
-    say!("Rendering the built-in scene to a picture (this version has no viewer window).");
-    commands::render::run(&args, &clap::ArgMatches::default(), cx)?;
+    say!("No window: rendering the built-in scene to a picture instead.");
+    commands::render::run(&args, &nothing, cx)?;
     let place = std::path::absolute(&args.output)?;
     say!("The picture is {}. Try `catoptric render --help` next.", place.display());
     Ok(())

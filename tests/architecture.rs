@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Rooms and what they may use besides themselves and [`ANYONE`].
-const ROOMS: [(&str, &[&str]); 12] = [
+const ROOMS: [(&str, &[&str]); 13] = [
     ("geometry", &[]),
     ("image", &[]),
     ("camera", &["geometry"]),
@@ -48,6 +48,23 @@ const ROOMS: [(&str, &[&str]); 12] = [
             "methods",
             "backend",
             "frame",
+        ],
+    ),
+    (
+        "viewer",
+        &[
+            "geometry",
+            "image",
+            "camera",
+            "accel",
+            "scene",
+            "visibility",
+            "plan",
+            "cull",
+            "methods",
+            "backend",
+            "frame",
+            "analysis",
         ],
     ),
 ];

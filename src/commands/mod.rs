@@ -5,6 +5,8 @@ pub(crate) mod compare;
 pub(crate) mod info;
 mod memory;
 pub(crate) mod render;
+#[cfg(feature = "viewer")]
+pub(crate) mod view;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -73,7 +75,7 @@ pub(crate) struct SceneArgs {
     fov: Option<f64>,
     /// Picture size in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size, allow_hyphen_values = true)]
-    size: ImageSize,
+    pub(crate) size: ImageSize,
     /// Threads (default: all cores)
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u64).range(1..=MAX_THREADS))]
@@ -141,36 +143,49 @@ impl SceneArgs {
         Ok(())
     }
 
-    /// Loads and prepares. `leaf` is a preset's leaf size.
-    pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
+    /// What can be refused before anything is read, and the threads.
+    pub(crate) fn begin(&self) -> anyhow::Result<()> {
         memory::check(self.surfels, self.size)?;
         if let Err(name) = requested_level() {
             let problem = format!("{name:?} is not an instruction set");
             let remedy = "unset it, or choose sse2, sse4.2, avx2 or avx512";
             return Err(Error::input(SIMD_VARIABLE, "", problem, remedy).into());
         }
-        self.start_threads()?;
-        let start = Instant::now();
-        let request = Request {
+        self.start_threads()
+    }
+
+    /// The scene that is asked for.
+    pub(crate) fn request(&self) -> Request {
+        Request {
             inputs: self.inputs.clone(),
             mirrors: self.mirror.clone(),
             objects: self.object.clone(),
             eye: self.eye,
             target: self.target,
             fov_y_deg: self.fov,
-        };
-        let scene = arrange::scene(&request, cx)?;
-        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        }
+    }
+
+    /// How it is to be prepared. `leaf` is a preset's leaf size.
+    pub(crate) fn prepare_options(&self, leaf: Option<u32>) -> PrepareOptions {
         let standard = KdTreeLimits::default();
-        let options = PrepareOptions {
+        PrepareOptions {
             surfels: self.surfels,
             tree: KdTreeLimits {
                 leaf_points: self.leaf.or(leaf).unwrap_or(standard.leaf_points),
                 leaf_size: self.leaf_size,
             },
             seed: self.seed,
-        };
-        let scene = PreparedScene::new(&scene, &options, cx)?;
+        }
+    }
+
+    /// Loads and prepares. `leaf` is a preset's leaf size.
+    pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
+        self.begin()?;
+        let start = Instant::now();
+        let scene = arrange::scene(&self.request(), cx)?;
+        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        let scene = PreparedScene::new(&scene, &self.prepare_options(leaf), cx)?;
         let eye = seen(scene.eye_for(self.size), "--eye, --target, --fov")?;
         Ok(Ready { scene, eye, load_ms })
     }

@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 #[cfg(feature = "gpu")]
 use catoptric::backend::gpu;
 use catoptric::backend::{Backend, cpu::Cpu, fastest};
+use catoptric::camera::eye::ImageSize;
 use catoptric::frame::{FrameReport, Renderer};
 use catoptric::geometry::lanes::simd_level;
 use catoptric::image::aov::{self, write_aov};
 use catoptric::image::io::{check_output, write_picture};
 use catoptric::image::temporal::{Restlessness, Sequence};
 use catoptric::methods::Method;
+use catoptric::scene::prepared::PrepareTimes;
 use catoptric::{Context, Error};
 use clap::{ArgMatches, Args};
 use serde_json::{Value, json};
@@ -81,6 +83,19 @@ pub(crate) struct HowArgs {
 }
 
 impl HowArgs {
+    /// The defaults.
+    pub(crate) fn standard() -> Self {
+        Self {
+            method: "c3rc".into(),
+            backend: "auto".into(),
+            adapter: None,
+            gpu_path: "compute".into(),
+            stats: false,
+            preset: None,
+            quality: "default".into(),
+        }
+    }
+
     /// A renderer on the backend that is asked for.
     pub(crate) fn renderer(&self, method: &dyn Method) -> anyhow::Result<Renderer> {
         let backend: Box<dyn Backend> = match self.backend.as_str() {
@@ -232,40 +247,64 @@ pub(crate) fn where_it_ran(report: &FrameReport) -> String {
 /// none of.
 pub(crate) fn figures(ready: &Ready, report: &FrameReport) -> Value {
     let scene = &ready.scene;
-    let size = ready.eye.size;
-    json!({
-        "scene": scene.name,
-        "method": report.method,
-        "backend": report.backend,
-        "device": report.device,
-        "size": [size.width, size.height],
-        "surfels": scene.surfel_count(),
-        "mirror_triangles": scene.mirror_triangle_count(),
-        "cameras": report.cameras,
-        "batches": report.batches,
-        "projections": report.projections,
-        "valid": report.valid,
-        "valid_share": report.valid_share(),
-        "mirror_pixels": report.mirror_pixels,
-        "covered_pixels": report.covered_pixels,
-        "threads": rayon::current_num_threads(),
-        "simd": simd_name(),
-        "ms": {
-            "load": ms(Some(ready.load_ms)),
-            "sample": ms(Some(scene.times.sample_ms)),
-            "tree": ms(Some(scene.times.tree_ms)),
-            "shade": ms(Some(scene.times.shade_ms)),
-            "ids": ms(report.ids_ms),
-            "cameras": ms(report.cameras_ms),
-            "cull": ms(report.cull_ms),
-            "project": ms(report.project_ms),
-            "splat": ms(report.splat_ms),
-            "layer": ms(report.layer_ms),
-            "rays": ms(report.rays_ms),
-            "composite": ms(report.composite_ms),
-            "frame": ms(report.frame_ms),
-        },
-    })
+    let subject = Subject {
+        scene: &scene.name,
+        surfels: scene.surfel_count(),
+        mirror_triangles: scene.mirror_triangle_count(),
+        size: ready.eye.size,
+        load_ms: ready.load_ms,
+        times: scene.times,
+    };
+    subject.figures(report)
+}
+
+/// What figures are about.
+pub(crate) struct Subject<'a> {
+    pub(crate) scene: &'a str,
+    pub(crate) surfels: usize,
+    pub(crate) mirror_triangles: usize,
+    pub(crate) size: ImageSize,
+    pub(crate) load_ms: f64,
+    pub(crate) times: PrepareTimes,
+}
+
+impl Subject<'_> {
+    /// See [`figures`].
+    pub(crate) fn figures(&self, report: &FrameReport) -> Value {
+        json!({
+            "scene": self.scene,
+            "method": report.method,
+            "backend": report.backend,
+            "device": report.device,
+            "size": [self.size.width, self.size.height],
+            "surfels": self.surfels,
+            "mirror_triangles": self.mirror_triangles,
+            "cameras": report.cameras,
+            "batches": report.batches,
+            "projections": report.projections,
+            "valid": report.valid,
+            "valid_share": report.valid_share(),
+            "mirror_pixels": report.mirror_pixels,
+            "covered_pixels": report.covered_pixels,
+            "threads": rayon::current_num_threads(),
+            "simd": simd_name(),
+            "ms": {
+                "load": ms(Some(self.load_ms)),
+                "sample": ms(Some(self.times.sample_ms)),
+                "tree": ms(Some(self.times.tree_ms)),
+                "shade": ms(Some(self.times.shade_ms)),
+                "ids": ms(report.ids_ms),
+                "cameras": ms(report.cameras_ms),
+                "cull": ms(report.cull_ms),
+                "project": ms(report.project_ms),
+                "splat": ms(report.splat_ms),
+                "layer": ms(report.layer_ms),
+                "rays": ms(report.rays_ms),
+                "composite": ms(report.composite_ms),
+                "frame": ms(report.frame_ms),
+            },
+        })
+    }
 }
 
 /// The instruction set in use, such as `avx2`.

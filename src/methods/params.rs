@@ -1,6 +1,7 @@
 //! Parameters of methods: described as data, so that flags, menus and benches come from one place.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use crate::error::{Error, Result};
 
@@ -11,6 +12,16 @@ pub enum Value {
     Choice(&'static str),
     /// A whole number.
     Integer(u32),
+}
+
+impl fmt::Display for Value {
+    /// As [`Params::set`] reads it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Choice(word) => f.write_str(word),
+            Self::Integer(n) => write!(f, "{n}"),
+        }
+    }
 }
 
 /// What values a parameter takes.
@@ -104,6 +115,11 @@ impl Params {
         };
         self.0.insert(info.id, value);
         Ok(())
+    }
+
+    /// The value of a parameter; `None` if the method has no such parameter.
+    pub fn get(&self, id: &str) -> Option<Value> {
+        self.0.get(id).copied()
     }
 
     /// The word of a choice.

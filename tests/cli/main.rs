@@ -9,6 +9,8 @@ mod gpu;
 mod interrupt;
 mod runs;
 mod same_bytes;
+#[cfg(feature = "viewer")]
+mod view;
 
 use std::ffi::OsStr;
 use std::fs;

@@ -1,0 +1,452 @@
+//! The window's state, and one pass over it: events in, panels and canvas, wishes out.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+use eframe::egui::{self, TextureHandle, TextureOptions};
+use glam::DVec3;
+
+use super::gizmo::Handles;
+use super::settings::{Settings, Shown};
+use super::worker::{
+    Event, LoadRequest, Map, Prepared, Probe, Probed, Save, Shot, Thing, View, What, Worker,
+};
+use super::{Opening, canvas, navigation, panels};
+use crate::camera::eye::ImageSize;
+use crate::frame::FrameReport;
+use crate::geometry::Similarity;
+use crate::scene::arrange::Request;
+use crate::scene::description::{EyeDescription, Scene};
+use crate::scene::fit::world_bounds;
+use crate::scene::prepared::PrepareOptions;
+
+/// After so long without a change, pictures are full again and shadows follow.
+const REST: Duration = Duration::from_millis(120);
+/// What a picture may take while something moves, milliseconds.
+const BUDGET_MS: f64 = 33.0;
+/// Pictures shrink by no more than this per axis while something moves.
+const LEAST_SCALE: f64 = 0.5;
+/// Reports that are kept for the plot.
+const HISTORY: usize = 120;
+/// How long a message stays.
+const MESSAGE: Duration = Duration::from_secs(6);
+
+/// What a dialog gave.
+pub(super) enum Chosen {
+    Open(Vec<PathBuf>),
+    Picture(PathBuf),
+    Aov(PathBuf),
+    Scene(PathBuf),
+}
+
+/// What was drawn last, as the window has it.
+pub(super) struct Display {
+    pub(super) textures: Vec<TextureHandle>,
+    pub(super) map: Option<TextureHandle>,
+    pub(super) view: Arc<View>,
+    pub(super) reports: Vec<FrameReport>,
+    pub(super) errors: Option<(f64, Option<f64>, f64)>,
+    pub(super) complete: bool,
+}
+
+/// The whole window.
+pub(super) struct Viewer {
+    pub(super) worker: Worker,
+    pub(super) settings: Settings,
+    /// How scenes are prepared; what the sliders say, which is used from the next load on.
+    pub(super) prepare: PrepareOptions,
+    pub(super) mirror_triangles: Option<usize>,
+    /// What the last load was told.
+    loaded: (PrepareOptions, Option<usize>),
+    /// The open scene has been sampled again: things lie where they were put.
+    is_prepared_anew: bool,
+    /// Where the scene came from.
+    pub(super) request: Request,
+    /// As it was read.
+    pub(super) scene: Option<Arc<Scene>>,
+    /// Where its objects, then its mirrors are now.
+    pub(super) placements: Arc<Vec<Similarity>>,
+    pub(super) prepared: Option<Prepared>,
+    pub(super) eye: EyeDescription,
+    /// Whether the next scene that is read brings its own eye.
+    takes_eye: bool,
+    pub(super) display: Option<Display>,
+    pub(super) history: VecDeque<FrameReport>,
+    pub(super) progress: Option<(String, f64)>,
+    /// For people: what happened, and whether it is bad.
+    pub(super) message: Option<(String, bool, Instant)>,
+    pub(super) selected: Option<Thing>,
+    pub(super) handles: Handles,
+    /// Under the pointer, and where it was clicked.
+    pub(super) probed: Option<Probed>,
+    pub(super) pinned: Option<Probed>,
+    pub(super) help: bool,
+    pub(super) chosen: (Sender<Chosen>, Receiver<Chosen>),
+    /// The canvas in pixels.
+    pub(super) size: ImageSize,
+    /// Where it begins in the window, pixels.
+    pub(super) canvas: [u32; 2],
+    posted: Option<View>,
+    /// Eye, places and canvas of the last pass.
+    wished: Option<(EyeDescription, Arc<Vec<Similarity>>, ImageSize)>,
+    changed: Instant,
+    /// What a full picture in motion takes, milliseconds; a running mean.
+    moving_ms: f64,
+    /// Frames are drawn as they are at rest: for measurements.
+    pub(super) steady: bool,
+    /// Pictures that were taken over from the worker.
+    pub(super) shots: u64,
+}
+
+impl Viewer {
+    /// Starts loading.
+    pub(super) fn new(context: &egui::Context, opening: &Opening, settings: Settings) -> Self {
+        let waker = context.clone();
+        let mut worker = Worker::new(move || waker.request_repaint());
+        worker.load(LoadRequest {
+            what: What::Request(opening.request.clone()),
+            prepare: opening.prepare,
+            mirror_triangles: None,
+        });
+        Self {
+            worker,
+            settings,
+            prepare: opening.prepare,
+            mirror_triangles: None,
+            loaded: (opening.prepare, None),
+            is_prepared_anew: false,
+            request: opening.request.clone(),
+            scene: None,
+            placements: Arc::default(),
+            prepared: None,
+            eye: EyeDescription {
+                position: glam::DVec3::Z,
+                target: glam::DVec3::ZERO,
+                up: glam::DVec3::Y,
+                fov_y: 0.8,
+            },
+            takes_eye: true,
+            display: None,
+            history: VecDeque::new(),
+            progress: None,
+            message: None,
+            selected: None,
+            handles: Handles::default(),
+            probed: None,
+            pinned: None,
+            help: false,
+            chosen: channel(),
+            size: ImageSize { width: 1, height: 1 },
+            canvas: [0; 2],
+            posted: None,
+            wished: None,
+            changed: Instant::now(),
+            moving_ms: 0.0,
+            steady: false,
+            shots: 0,
+        }
+    }
+
+    /// One pass.
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui) {
+        self.receive(ui.ctx());
+        panels::keys(self, ui.ctx());
+        panels::show(self, ui);
+        canvas::show(self, ui);
+        self.wish(ui.ctx());
+    }
+
+    fn receive(&mut self, context: &egui::Context) {
+        for event in self.worker.events() {
+            match event {
+                Event::Progress(progress) => self.progress = progress,
+                Event::Failed(what) => self.tell(what, true),
+                Event::Read(scene) => self.read(scene),
+                Event::Ready(prepared) => {
+                    self.prepared = Some(*prepared);
+                    // Even if nothing moved, there is something new to draw.
+                    self.posted = None;
+                }
+                Event::Shot(shot) => self.take(context, *shot),
+                Event::Probed(probed) => self.probed(*probed),
+                Event::Saved(path) => self.tell(format!("saved {}", path.display()), false),
+            }
+        }
+        let dropped: Vec<PathBuf> =
+            context.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
+        if !dropped.is_empty() {
+            self.open(&dropped);
+        }
+        while let Ok(chosen) = self.chosen.1.try_recv() {
+            match chosen {
+                Chosen::Open(files) => self.open(&files),
+                Chosen::Picture(path) => self.save(path, None),
+                Chosen::Aov(path) => self.save(path.with_extension("png"), Some(path)),
+                Chosen::Scene(path) => self.save_scene(&path),
+            }
+        }
+    }
+
+    pub(super) fn tell(&mut self, what: String, is_bad: bool) {
+        self.message = Some((what, is_bad, Instant::now()));
+    }
+
+    /// Whether a message is still to be shown. Bad ones stay until they are closed.
+    pub(super) fn message_is_fresh(&self) -> bool {
+        self.message.as_ref().is_some_and(|(_, is_bad, at)| *is_bad || at.elapsed() < MESSAGE)
+    }
+
+    fn read(&mut self, scene: Arc<Scene>) {
+        let objects = scene.objects.iter().map(|o| o.transform);
+        let placements = objects.chain(scene.mirrors.iter().map(|m| m.transform)).collect();
+        self.placements = Arc::new(placements);
+        if self.takes_eye {
+            self.eye = scene.eye;
+        }
+        self.takes_eye = false;
+        self.selected = None;
+        (self.probed, self.pinned) = (None, None);
+        self.scene = Some(scene);
+    }
+
+    /// Opens a scene file, or models beside the teapot.
+    pub(super) fn open(&mut self, files: &[PathBuf]) {
+        let inputs = files.iter().map(|f| f.to_string_lossy().into_owned()).collect();
+        self.takes_eye = true;
+        self.is_prepared_anew = false;
+        self.mirror_triangles = None;
+        self.request = Request { inputs, ..Request::default() };
+        self.load(What::Request(self.request.clone()));
+    }
+
+    /// Samples the open scene anew, with what the sliders say.
+    pub(super) fn prepare_again(&mut self) {
+        if let Some(scene) = self.as_placed() {
+            self.is_prepared_anew = self.is_changed();
+            self.load(What::Open(Arc::new(scene)));
+        }
+    }
+
+    fn load(&mut self, what: What) {
+        self.message = None;
+        let (prepare, mirror_triangles) = (self.prepare, self.mirror_triangles);
+        self.loaded = (prepare, mirror_triangles);
+        self.worker.load(LoadRequest { what, prepare, mirror_triangles });
+    }
+
+    /// The scene as it is seen now.
+    pub(super) fn as_placed(&self) -> Option<Scene> {
+        let mut scene = (**self.scene.as_ref()?).clone();
+        let objects = scene.objects.len();
+        for (object, place) in scene.objects.iter_mut().zip(self.placements.iter()) {
+            object.transform = *place;
+        }
+        for (mirror, place) in scene.mirrors.iter_mut().zip(&self.placements[objects..]) {
+            mirror.transform = *place;
+        }
+        scene.eye = self.eye;
+        Some(scene)
+    }
+
+    fn save_scene(&mut self, path: &std::path::Path) {
+        let Some(scene) = self.as_placed() else { return };
+        let text = crate::scene::file::to_toml(&scene);
+        let done = text.and_then(|text| crate::image::io::write_bytes(path, text.as_bytes()));
+        match done {
+            Ok(()) => self.tell(format!("saved {}", path.display()), false),
+            Err(error) => self.tell(error.to_string(), true),
+        }
+    }
+
+    pub(super) fn save(&mut self, path: PathBuf, aov: Option<PathBuf>) {
+        let view = self.wanted(true, 1.0);
+        self.worker.save(Save { path, aov, view });
+    }
+
+    fn take(&mut self, context: &egui::Context, shot: Shot) {
+        self.shots += 1;
+        let ms: f64 = shot.ms;
+        if !shot.view.rest {
+            let share = shot.view.size.pixels() as f64 / self.size.pixels().max(1) as f64;
+            let full = ms / share.clamp(0.1, 1.0);
+            self.moving_ms =
+                if self.moving_ms == 0.0 { full } else { 0.7 * self.moving_ms + 0.3 * full };
+        } else if self.moving_ms == 0.0 {
+            self.moving_ms = ms;
+        }
+        if let Some(report) = shot.reports.first() {
+            self.history.push_back(report.clone());
+            if self.history.len() > HISTORY {
+                self.history.pop_front();
+            }
+        }
+        let mut textures = match self.display.take() {
+            Some(display) => display.textures,
+            None => Vec::new(),
+        };
+        textures.truncate(shot.pictures.len());
+        for (i, picture) in shot.pictures.into_iter().enumerate() {
+            match textures.get_mut(i) {
+                Some(texture) => texture.set(picture, TextureOptions::LINEAR),
+                None => textures.push(context.load_texture(
+                    format!("side {i}"),
+                    picture,
+                    TextureOptions::LINEAR,
+                )),
+            }
+        }
+        let load = |map| context.load_texture("map", map, TextureOptions::NEAREST);
+        self.display = Some(Display {
+            textures,
+            map: shot.map.map(load),
+            view: shot.view,
+            reports: shot.reports,
+            errors: shot.errors,
+            complete: shot.complete,
+        });
+    }
+
+    fn probed(&mut self, probed: Probed) {
+        if probed.probe.pick {
+            self.selected = probed.thing;
+            if self.settings.inspect {
+                self.pinned = probed.reflected.is_some().then(|| probed.clone());
+            }
+        }
+        self.probed = Some(probed);
+    }
+
+    /// Asks what is at a place of the canvas, as shares of its size.
+    pub(super) fn ask(&mut self, at: egui::Vec2, pick: bool) {
+        let at = glam::Vec2::new(at.x, at.y);
+        self.worker.probe(Probe { at, pick, trace: self.settings.inspect });
+    }
+
+    fn wanted(&self, rest: bool, scale: f64) -> View {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at most a side"
+        )]
+        let side = |px: u32| ((f64::from(px) * scale).round() as u32).max(1);
+        let mut sides = vec![self.settings.sides[0].side()];
+        if self.settings.compare {
+            sides.push(self.settings.sides[1].side());
+        }
+        if !rest && self.settings.adapt && self.moving_ms > BUDGET_MS && !self.steady {
+            for (side, settings) in sides.iter_mut().zip(&self.settings.sides) {
+                let mut draft = settings.clone();
+                draft.set_quality("draft");
+                *side = draft.side();
+            }
+        }
+        let map = match (self.settings.compare, self.settings.shown) {
+            (true, Shown::Difference) => Map::Difference,
+            (true, Shown::Flip) if rest => Map::Flip,
+            (false, _) if self.settings.costs && rest => Map::Cost,
+            _ => Map::None,
+        };
+        View {
+            eye: self.eye,
+            size: ImageSize { width: side(self.size.width), height: side(self.size.height) },
+            sides,
+            placements: Arc::clone(&self.placements),
+            rest,
+            map,
+            planes: rest && self.settings.inspect,
+        }
+    }
+
+    /// The scale at which pictures keep up with what moves.
+    fn scale(&self) -> f64 {
+        if !self.settings.adapt || self.steady {
+            return 1.0;
+        }
+        let scale = (BUDGET_MS / self.moving_ms.max(1.0)).sqrt();
+        // In steps, so that it does not flicker.
+        ((scale * 8.0).floor() / 8.0).clamp(LEAST_SCALE, 1.0)
+    }
+
+    /// Posts what is to be seen, if that is news.
+    pub(super) fn wish(&mut self, context: &egui::Context) {
+        if self.prepared.is_none() {
+            return;
+        }
+        let now = (self.eye, Arc::clone(&self.placements), self.size);
+        let moved = self.wished.as_ref().is_some_and(|before| *before != now);
+        self.wished = Some(now);
+        if moved {
+            self.changed = Instant::now();
+        }
+        let since = self.changed.elapsed();
+        let rest = self.posted.is_none() || since >= REST;
+        let view = if rest { self.wanted(true, 1.0) } else { self.wanted(false, self.scale()) };
+        if !rest {
+            context.request_repaint_after(REST - since);
+        }
+        // While something moves, only that is news.
+        let news = if rest { self.posted.as_ref() != Some(&view) } else { moved };
+        if news {
+            self.worker.view(view.clone());
+            self.posted = Some(view);
+        }
+    }
+}
+
+/// What menus, keys and panels do.
+impl Viewer {
+    /// The scene's size, for what is relative to it.
+    pub(super) fn scene_size(&self) -> f64 {
+        self.prepared.as_ref().map_or(1.0, |p| (p.bounds[1] - p.bounds[0]).length().max(1e-9))
+    }
+
+    fn aspect(&self) -> f64 {
+        f64::from(self.size.width) / f64::from(self.size.height)
+    }
+
+    pub(super) fn frame_all(&mut self) {
+        if let Some(prepared) = &self.prepared {
+            self.eye = navigation::frame(&self.eye, prepared.bounds, self.aspect());
+        }
+    }
+
+    pub(super) fn frame_selected(&mut self) {
+        let (Some(thing), Some(scene)) = (self.selected, &self.scene) else { return };
+        let mesh = match thing {
+            Thing::Object(i) => &scene.objects[i].mesh,
+            Thing::Mirror(i) => &scene.mirrors[i].mesh,
+        };
+        let Some(place) = self.placements.get(thing.placement(scene.objects.len())) else { return };
+        let (min, max) = world_bounds(mesh, place);
+        self.eye = navigation::frame(&self.eye, [min, max], self.aspect());
+    }
+
+    /// The scene's own view.
+    pub(super) fn go_home(&mut self) {
+        if let Some(scene) = &self.scene {
+            self.eye = scene.eye;
+        }
+    }
+
+    pub(super) fn look_from(&mut self, direction: DVec3) {
+        self.eye = navigation::from_direction(&self.eye, direction);
+    }
+
+    /// Whether the command line's words alone do not make what is seen.
+    pub(super) fn is_changed(&self) -> bool {
+        let Some(scene) = &self.scene else { return false };
+        let objects = scene.objects.iter().map(|o| o.transform);
+        let places = objects.chain(scene.mirrors.iter().map(|m| m.transform));
+        !places.eq(self.placements.iter().copied())
+            || self.mirror_triangles.is_some()
+            || self.is_prepared_anew
+    }
+
+    /// Whether the sliders say something else than what was prepared.
+    pub(super) fn prepare_differs(&self) -> bool {
+        (self.prepare, self.mirror_triangles) != self.loaded
+    }
+}

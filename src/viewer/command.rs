@@ -1,0 +1,80 @@
+//! The command that renders what is seen.
+
+use std::fmt::Write as _;
+
+use super::app::Viewer;
+use crate::scene::prepared::PrepareOptions;
+
+/// The command line, and what else is to be done for it to draw the same.
+pub(super) fn equivalent(viewer: &Viewer) -> (String, Option<&'static str>) {
+    let moved = viewer.is_changed();
+    let mut line = String::from("catoptric render");
+    if moved {
+        line += " scene.toml";
+    } else {
+        let request = &viewer.request;
+        for input in &request.inputs {
+            word(&mut line, input);
+        }
+        for (flag, names) in [("--mirror", &request.mirrors), ("--object", &request.objects)] {
+            for name in names {
+                line += " ";
+                line += flag;
+                word(&mut line, name);
+            }
+        }
+        let eye = viewer.eye;
+        for (flag, p) in [("--eye", eye.position), ("--target", eye.target)] {
+            let _ = write!(line, " {flag} {},{},{}", p.x, p.y, p.z);
+        }
+        let _ = write!(line, " --fov {}", eye.fov_y.to_degrees());
+    }
+    let _ = write!(line, " --size {}x{}", viewer.size.width, viewer.size.height);
+    let standard = PrepareOptions::default();
+    let now = viewer.prepare;
+    if now.surfels != standard.surfels {
+        let _ = write!(line, " --surfels {}", now.surfels);
+    }
+    if now.tree.leaf_points != standard.tree.leaf_points {
+        let _ = write!(line, " --leaf {}", now.tree.leaf_points);
+    }
+    if now.tree.leaf_size != standard.tree.leaf_size {
+        let _ = write!(line, " --leaf-size {}", now.tree.leaf_size);
+    }
+    if now.seed != standard.seed {
+        let _ = write!(line, " --seed {}", now.seed);
+    }
+    let side = viewer.settings.sides[0].side();
+    let _ = write!(line, " --method {} --backend {}", side.method, side.backend.word());
+    for info in viewer.settings.sides[0].method().info().params {
+        if let Some(value) = side.params.get(info.id).filter(|v| *v != info.default) {
+            let _ = write!(line, " --{} {value}", info.id);
+        }
+    }
+    line += " -o picture.png";
+    (line, moved.then_some("save the scene as scene.toml first"))
+}
+
+/// Appends a word as a shell takes it.
+fn word(line: &mut String, text: &str) {
+    let plain = |c: char| c.is_alphanumeric() || "-_./:=+,".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        let _ = write!(line, " {text}");
+    } else {
+        let _ = write!(line, " '{}'", text.replace('\'', r"'\''"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_reach_the_program_as_they_are() {
+        let mut line = String::new();
+        for text in ["a/b-1.toml", "my file.ply", "it's", ""] {
+            word(&mut line, text);
+        }
+        assert_eq!(line, r" a/b-1.toml 'my file.ply' 'it'\''s' ''");
+    }
+}
