@@ -39,8 +39,13 @@ impl Handles {
             place.point(pivot).to_array(),
         );
         self.gizmo.update_config(config(eye, response.rect, ui.ctx().pixels_per_point()));
-        let pointer = ui.input(|i| i.pointer.hover_pos()).unwrap_or_default();
         let primary = egui::PointerButton::Primary;
+        // A drag is known for one some points after it began; the handle is the one at its beginning.
+        let pointer = ui.input(|i| match response.drag_started_by(primary) {
+            true => i.pointer.press_origin(),
+            false => i.pointer.hover_pos(),
+        });
+        let pointer = pointer.unwrap_or_default();
         let interaction = GizmoInteraction {
             cursor_pos: (pointer.x, pointer.y),
             hovered: response.hovered(),

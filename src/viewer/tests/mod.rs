@@ -111,7 +111,7 @@ fn until_drawn(hands: &mut Hands<'_>) {
     });
 }
 
-/// Presses at `from`, moves to `to` in steps, releases.
+/// Presses at `from`, moves to `to` in few steps, as on a slow machine, releases.
 fn drag(hands: &mut Hands<'_>, button: egui::PointerButton, from: Pos2, to: Pos2) {
     let press = |pos, pressed| egui::Event::PointerButton {
         pos,
@@ -123,8 +123,8 @@ fn drag(hands: &mut Hands<'_>, button: egui::PointerButton, from: Pos2, to: Pos2
     hands.step();
     hands.event(press(from, true));
     hands.step();
-    for i in 1_u8..=8 {
-        hands.event(egui::Event::PointerMoved(from.lerp(to, f32::from(i) / 8.0)));
+    for i in 1_u8..=3 {
+        hands.event(egui::Event::PointerMoved(from.lerp(to, f32::from(i) / 3.0)));
         hands.step();
     }
     hands.event(press(to, false));
