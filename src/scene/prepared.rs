@@ -9,6 +9,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 
 use super::description::{Environment, EyeDescription, Light, Mirror, Paint, Scene};
+use super::sun_map::{Caster, SunMap};
 use super::{sample, shade};
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
 use crate::camera::eye::ImageSize;
@@ -16,7 +17,7 @@ use crate::camera::{Eye, MirrorTriangle};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::surfel::PADDING;
-use crate::geometry::{Aabb, Mesh, Similarity, Surfels};
+use crate::geometry::{Aabb, Mesh, SharedEdge, Similarity, Surfels};
 
 /// How a scene is prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,6 +84,8 @@ pub struct PreparedObject {
     pub positions: Vec<Vec3>,
     /// Index of its first triangle over all objects.
     pub first_triangle: u32,
+    /// Of the mesh.
+    edges: Vec<SharedEdge>,
 }
 
 /// The surfels of one object or mirror: they and their tree live in its own space and never move.
@@ -183,6 +186,8 @@ pub struct PreparedScene {
     pub triangles: TriangleBvh,
     /// The mirrors' triangles in scene space, mirror by mirror.
     pub mirror_triangles: TriangleBvh,
+    /// Shadows of the objects' triangles, as far as they are certain.
+    pub sun_map: SunMap,
     /// What rays meet that meet nothing else.
     pub environment: Environment,
     /// Sun and ambient.
@@ -259,6 +264,7 @@ impl PreparedScene {
                 to_scene: Similarity::IDENTITY,
                 positions: Vec::new(),
                 first_triangle,
+                edges: object.mesh.shared_edges(),
             });
             first_triangle += index(object.mesh.triangles().len());
         }
@@ -286,6 +292,7 @@ impl PreparedScene {
             surfels,
             triangles: TriangleBvh::build(&[]),
             mirror_triangles: TriangleBvh::build(&[]),
+            sun_map: SunMap::default(),
             environment: scene.environment,
             light: scene.light,
             times,
@@ -343,6 +350,7 @@ impl PreparedScene {
             .flat_map(|o| o.mesh.triangles().iter().map(|t| t.map(|i| o.positions[i as usize])))
             .collect();
         self.triangles = TriangleBvh::build(&corners);
+        self.sun_map = self.map_shadows();
         for cloud in &self.clouds[..self.objects.len()] {
             let range = cloud.surfels.start as usize..cloud.surfels.end as usize;
             shade::bake(
@@ -356,6 +364,20 @@ impl PreparedScene {
         }
         self.average();
         Ok(())
+    }
+
+    fn map_shadows(&self) -> SunMap {
+        let objects = self.objects.iter().zip(&self.clouds);
+        let casters: Vec<Caster> = objects
+            .map(|(object, cloud)| Caster {
+                positions: &object.positions,
+                triangles: object.mesh.triangles(),
+                edges: &object.edges,
+                closed: cloud.closed,
+            })
+            .collect();
+        let apart = shade::Sun::new(&self.triangles, &self.light).apart;
+        SunMap::new(&casters, self.light.to_sun, apart)
     }
 
     /// Gives the representatives the colours of what they stand for.
