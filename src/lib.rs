@@ -101,6 +101,8 @@
 //! - Culling is not a pass. A splat pass carries a [`plan::BatchSource`], and the backend asks it for the
 //!   batches of a camera when it has room for them. So neither room knows the other, batches stay in the
 //!   cache, and each stage can still be timed.
+//! - The direct view reads most shadows from a map along the sun that keeps bounds over its texels, not samples of them;
+//!   only what they leave open is traced. So it shows what shadow rays show.
 //! - The direct view is antialiased over five samples a pixel, the reflection has one value a pixel: the
 //!   composition mixes the two by the samples that show a mirror.
 //! - A camera draws a little outside its triangle (guard band), but only on pixels that are its triangle's:

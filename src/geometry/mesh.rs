@@ -153,23 +153,7 @@ impl Mesh {
     /// Whether the triangles enclose a volume and the normals point out of it: every edge has one triangle on each
     /// side. Vertices at one place count as one.
     pub fn is_closed_outward(&self) -> bool {
-        // Vertices at one place have one name: the first of them.
-        let mut places: Vec<([u32; 3], u32)> = self
-            .positions
-            .par_iter()
-            .enumerate()
-            // -0 is 0.
-            .map(|(i, p)| {
-                (p.to_array().map(|x| (x + 0.0).to_bits()), u32::try_from(i).unwrap_or(u32::MAX))
-            })
-            .collect();
-        places.par_sort_unstable();
-        let mut name = vec![0; places.len()];
-        for same in places.chunk_by(|a, b| a.0 == b.0) {
-            for (_, i) in same {
-                name[*i as usize] = same[0].1;
-            }
-        }
+        let name = self.places();
         let mut edges = Vec::with_capacity(3 * self.triangles.len());
         let (mut volume, mut outward) = (0.0, 0.0);
         let middle = self.bounds().center().as_dvec3();

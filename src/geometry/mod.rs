@@ -2,6 +2,7 @@
 
 pub mod aabb;
 pub mod bicubic;
+pub mod edges;
 pub mod lanes;
 pub mod mesh;
 pub mod surfel;
@@ -9,6 +10,7 @@ pub mod transform;
 
 pub use aabb::Aabb;
 pub use bicubic::{BicubicPatch, PatchPoint};
+pub use edges::SharedEdge;
 pub use mesh::{Mesh, MeshDefect};
 pub use surfel::Surfels;
 pub use transform::Similarity;

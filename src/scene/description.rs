@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
 
+use crate::geometry::lanes::Real;
 use crate::geometry::{Mesh, Similarity};
 
 /// A scene to be prepared. World space: right-handed, y up unless the eye says otherwise, f64.
@@ -135,18 +136,27 @@ impl Paint {
             }
             Self::Constant(color) => color,
             Self::Pattern { kind, colors, period } => {
-                // A hair off the origin, so that a face at a multiple of the period is not noise.
-                let p = position / period + Vec3::splat(1.0e-4);
-                let odd = match kind {
-                    PatternKind::Checker => {
-                        (p.x.floor() + p.y.floor() + p.z.floor()).rem_euclid(2.0) >= 1.0
-                    }
-                    PatternKind::Stripes => p.y.rem_euclid(2.0) >= 1.0,
-                    PatternKind::Rings => p.x.hypot(p.z).rem_euclid(2.0) >= 1.0,
-                };
+                let odd = kind.is_odd((position / period).to_array());
                 colors[usize::from(odd)]
             }
         }
+    }
+}
+
+impl PatternKind {
+    /// Whether the second colour is at a position (in periods), in lanes.
+    #[inline(always)]
+    pub fn is_odd<R: Real<Scalar = f32>>(self, position: [R; 3]) -> R::Mask {
+        // A hair off the origin, so that a face at a multiple of the period is not noise.
+        const HAIR: f32 = 1.0e-4;
+        let [x, y, z] = [position[0] + HAIR, position[1] + HAIR, position[2] + HAIR];
+        let cell = match self {
+            Self::Checker => x.floor() + y.floor() + z.floor(),
+            Self::Stripes => y.floor(),
+            Self::Rings => (x * x + z * z).sqrt().floor(),
+        };
+        let half = cell * 0.5;
+        half.floor().lt(half)
     }
 }
 

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::description::{Environment, Light};
+use crate::geometry::lanes::{Real, dot_const};
 
 /// Half the height of the band in which the sky turns into the ground, as y of a unit direction.
 pub(crate) const HORIZON_BLUR: f32 = 0.015;
@@ -19,47 +20,75 @@ impl Environment {
     ///
     /// Free of trigonometry, so that a shader can do the same.
     pub fn radiance(&self, direction: Vec3, light: &Light) -> Vec3 {
+        self.radiance_in(direction.to_array(), light).into()
+    }
+
+    /// [`Self::radiance`], in lanes.
+    #[inline(always)]
+    pub fn radiance_in<R: Real<Scalar = f32>>(&self, direction: [R; 3], light: &Light) -> [R; 3] {
+        let height = direction[1];
         let (zenith, horizon, ground) = match *self {
-            Self::Constant(radiance) => return radiance,
+            Self::Constant(Vec3 { x, y, z }) => {
+                return [height.splat(x), height.splat(y), height.splat(z)];
+            }
             Self::Sky { zenith, horizon, ground } => (zenith, horizon, ground),
         };
-        let height = direction.y;
+        let (zero, one) = (height.splat(0.0), height.splat(1.0));
         let above = smooth_step(-HORIZON_BLUR, HORIZON_BLUR, height);
 
         // Air: the horizon's colour where the line of sight through it is long.
-        let air = 1.0 - height.clamp(0.0, 1.0);
+        let air = one - height.max(zero).min(one);
         let air2 = air * air;
-        let sky = zenith.lerp(horizon, air * (0.15 + 0.85 * air2 * air));
+        let air = air * (air2 * air * 0.85 + 0.15);
 
         // The ground gets darker towards the feet and takes the colour of the air far away.
-        let down = 1.0 - (-height).clamp(0.0, 1.0);
+        let down = one - (-height).max(zero).min(one);
         let down2 = down * down;
         let down4 = down2 * down2;
-        let far = down4 * down4 * down4;
-        let land = (ground * (0.6 + 0.4 * down2)).lerp(horizon, 0.6 * far);
+        let far = down4 * down4 * down4 * 0.6;
+        let feet = down2 * 0.4 + 0.6;
 
-        land.lerp(sky + sun(direction, light), above)
+        let sun = sun(direction, light);
+        let mut radiance = [zero; 3];
+        for (k, radiance) in radiance.iter_mut().enumerate() {
+            let far_away = height.splat(horizon[k]);
+            let sky = mix(height.splat(zenith[k]), far_away, air) + sun * light.sun[k];
+            *radiance = mix(mix(feet * ground[k], far_away, far), sky, above);
+        }
+        radiance
     }
 }
 
+#[inline(always)]
+fn mix<R: Real>(from: R, to: R, share: R) -> R {
+    from + (to - from) * share
+}
+
 /// The sun's disc and the glow about it, which has the colour of the sun.
-fn sun(direction: Vec3, light: &Light) -> Vec3 {
-    let facing = direction.dot(light.to_sun).max(0.0);
+#[inline(always)]
+fn sun<R: Real<Scalar = f32>>(direction: [R; 3], light: &Light) -> R {
+    let facing = dot_const(direction, light.to_sun.to_array());
+    let facing = facing.max(facing.splat(0.0));
     let p2 = facing * facing;
     let p4 = p2 * p2;
     let p8 = p4 * p4;
-    let p32 = p8 * p8 * p8 * p8;
-    let p128 = p32 * p32 * p32 * p32;
-    let p512 = p128 * p128 * p128 * p128;
-    let p2048 = p512 * p512 * p512 * p512;
-    let glow = 0.03 * p8 + 0.08 * p32 + 0.15 * p128 + 0.3 * p512 + 0.8 * p2048;
-    light.sun * (glow + SUN_DISC * smooth_step(SUN_EDGE[0], SUN_EDGE[1], facing))
+    let p16 = p8 * p8;
+    let p32 = p16 * p16;
+    let p64 = p32 * p32;
+    let p128 = p64 * p64;
+    let p256 = p128 * p128;
+    let p512 = p256 * p256;
+    let p1024 = p512 * p512;
+    let p2048 = p1024 * p1024;
+    let glow = p8 * 0.03 + p32 * 0.08 + p128 * 0.15 + p512 * 0.3 + p2048 * 0.8;
+    glow + smooth_step(SUN_EDGE[0], SUN_EDGE[1], facing) * SUN_DISC
 }
 
 /// 0 below `from`, 1 above `to`, smooth between.
-fn smooth_step(from: f32, to: f32, x: f32) -> f32 {
-    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+#[inline(always)]
+fn smooth_step<R: Real<Scalar = f32>>(from: f32, to: f32, x: R) -> R {
+    let t = ((x - from) * (1.0 / (to - from))).max(x.splat(0.0)).min(x.splat(1.0));
+    t * t * (x.splat(3.0) - t * 2.0)
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ pub mod load;
 pub mod prepared;
 pub mod sample;
 pub mod shade;
+pub mod sun_map;
 
 pub use given::GivenSurfels;
 pub use prepared::{PrepareOptions, PreparedScene};

@@ -12,13 +12,14 @@ use glam::{DVec3, Vec3};
 
 use super::description::{Environment, EyeDescription, Light, Mirror, Paint, Scene};
 use super::sample;
+use super::sun_map::SunMap;
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
 use crate::camera::eye::ImageSize;
 use crate::camera::{Eye, MirrorTriangle};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::surfel::PADDING;
-use crate::geometry::{Aabb, Mesh, Similarity, Surfels};
+use crate::geometry::{Aabb, Mesh, SharedEdge, Similarity, Surfels};
 
 /// How a scene is prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +86,8 @@ pub struct PreparedObject {
     pub positions: Vec<Vec3>,
     /// Index of its first triangle over all objects.
     pub first_triangle: u32,
+    /// Of the mesh.
+    edges: Vec<SharedEdge>,
 }
 
 /// The surfels of one object or mirror: they and their tree live in its own space and never move.
@@ -169,6 +172,8 @@ pub struct PreparedScene {
     pub triangles: TriangleBvh,
     /// The mirrors' triangles in scene space, mirror by mirror.
     pub mirror_triangles: TriangleBvh,
+    /// Shadows of the objects' triangles, as far as they are certain.
+    pub sun_map: SunMap,
     /// What rays meet that meet nothing else.
     pub environment: Environment,
     /// Sun and ambient.
@@ -245,6 +250,7 @@ impl PreparedScene {
                 to_scene: Similarity::IDENTITY,
                 positions: Vec::new(),
                 first_triangle,
+                edges: object.mesh.shared_edges(),
             });
             first_triangle += index(object.mesh.triangles().len());
         }
@@ -272,6 +278,7 @@ impl PreparedScene {
             surfels,
             triangles: TriangleBvh::build(&[]),
             mirror_triangles: TriangleBvh::build(&[]),
+            sun_map: SunMap::default(),
             environment: scene.environment,
             light: scene.light,
             times,

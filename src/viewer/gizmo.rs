@@ -41,15 +41,14 @@ impl Handles {
         self.gizmo.update_config(config(eye, response.rect, ui.ctx().pixels_per_point()));
         let primary = egui::PointerButton::Primary;
         // A drag is known for one some points after it began; the handle is the one at its beginning.
-        let pointer = ui.input(|i| match response.drag_started_by(primary) {
-            true => i.pointer.press_origin(),
-            false => i.pointer.hover_pos(),
-        });
+        let begins = response.drag_started_by(primary);
+        let pointer =
+            ui.input(|i| if begins { i.pointer.press_origin() } else { i.pointer.hover_pos() });
         let pointer = pointer.unwrap_or_default();
         let interaction = GizmoInteraction {
             cursor_pos: (pointer.x, pointer.y),
             hovered: response.hovered(),
-            drag_started: response.drag_started_by(primary),
+            drag_started: begins,
             dragging: response.dragged_by(primary),
         };
         let moved = self.gizmo.update(interaction, &[target]);

@@ -81,18 +81,20 @@ impl Course {
         self.shots = viewer.shots;
         let now = Instant::now();
         self.first_picture_ms.get_or_insert_with(|| (now - self.started).as_secs_f64() * 1e3);
-        if !display.complete {
+        if !display.complete || display.view.size != viewer.size {
             return false;
+        }
+        if self.frames == 0 {
+            return display.view.rest;
         }
         let Some(home) = self.home else {
             self.home = Some(viewer.eye);
             viewer.steady = true;
             self.turn(viewer);
-            return self.frames == 0;
+            return false;
         };
-        // What was drawn before the orbit began, or in another size, does not count.
+        // What was drawn before the orbit began does not count.
         if display.view.eye != home
-            && display.view.size == viewer.size
             && let Some(last) = self.last.replace(now)
         {
             self.frame_ms.push((now - last).as_secs_f64() * 1e3);

@@ -44,6 +44,23 @@ impl RayWeights {
         let finite = weights[0].abs().max(weights[1].abs()).max(weights[2].abs()) < f32::INFINITY;
         (in_front && finite).then_some(weights)
     }
+
+    /// The functions that the weights are proportional to, about a picture position: there, and what they change by per
+    /// pixel in x and y. Where the triangle's plane is in front of the eye their sum is positive, and about 1 near the
+    /// position; all zero if the triangle is seen edge-on.
+    #[expect(clippy::cast_possible_truncation, reason = "weights are f32 everywhere")]
+    pub fn shares_about(&self, px: DVec2) -> [[f32; 3]; 3] {
+        let p = (px - self.middle).extend(1.0);
+        let start = self.rows.map(|row| row.dot(p));
+        let total = |list: [f64; 3]| list[0] + list[1] + list[2];
+        let by = [self.rows.map(|row| row.x), self.rows.map(|row| row.y)];
+        let size = total(start).abs() + total(by[0]).abs() + total(by[1]).abs();
+        let scale = self.volume.signum() / size;
+        if !(scale.abs() < f64::INFINITY && self.volume != 0.0) {
+            return [[0.0; 3]; 3];
+        }
+        [start, by[0], by[1]].map(|list| list.map(|share| (share * scale) as f32))
+    }
 }
 
 /// The weights of `corners` (scene space) where the view ray through a picture position meets their

@@ -3,13 +3,13 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::direct::{Appearance, DirectView, Hit, compose};
+use super::direct::{DirectView, compose};
+use super::look::Look;
 use crate::camera::mirror_ray::{RaySource, reflected_ray};
 use crate::camera::{Eye, RayScale};
 use crate::image::Picture;
 use crate::plan::Reflection;
 use crate::scene::prepared::PreparedScene;
-use crate::scene::shade::{Sun, SurfacePoint, shade};
 use crate::visibility::{NONE_ID, SurfaceMesh, Visibility};
 
 /// Completes `reflection` (environment, tint; its planes' radiance, where there are planes) and draws the picture of what the eye sees.
@@ -64,11 +64,8 @@ pub fn finish(
     };
     picture.width = eye.size.width;
     picture.height = eye.size.height;
-    let mut colors = vec![Vec3::ZERO; eye.size.pixels()];
-    let look = Look { scene, sun: Sun::new(&scene.triangles, &scene.light) };
-    compose(&view, &look, &mut colors);
-    picture.rgb.clear();
-    picture.rgb.extend(colors.iter().map(|c| c.to_array()));
+    picture.rgb.resize(eye.size.pixels(), [0.0; 3]);
+    compose(&view, &Look::new(scene), &mut picture.rgb);
 }
 
 /// The mirrors as the rasteriser takes them.
@@ -95,32 +92,4 @@ fn reflected_sky(scene: &PreparedScene, eye: &Eye, triangle: u32, px: Vec2) -> V
     let ray = reflected_ray(eye, px, &mirror, RaySource::Surface, RayScale::EyeDistance);
     let direction = ray.map_or(Vec3::Y, |(_, direction)| direction);
     scene.environment.radiance(direction, &scene.light)
-}
-
-/// What the scene's surfaces and sky look like.
-struct Look<'a> {
-    scene: &'a PreparedScene,
-    sun: Sun<'a>,
-}
-
-impl Appearance for Look<'_> {
-    #[inline(always)]
-    fn albedo(&self, hit: &Hit) -> Vec3 {
-        self.scene.objects[hit.object].albedo(hit.triangle, hit.weights)
-    }
-
-    #[inline(always)]
-    fn light(&self, hit: &Hit) -> Vec3 {
-        let normal = self.scene.objects[hit.object].normal(hit.triangle, hit.weights);
-        let point = SurfacePoint { position: hit.point, normal, extent: 0.0 };
-        shade(Vec3::ONE, normal, self.sun.visible_from(&point), &self.scene.light)
-    }
-
-    fn sky(&self, direction: Vec3) -> Vec3 {
-        self.scene.environment.radiance(direction, &self.scene.light)
-    }
-
-    fn tint(&self, mirror: usize) -> Vec3 {
-        self.scene.mirrors[mirror].tint
-    }
 }

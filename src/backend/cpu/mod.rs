@@ -2,6 +2,7 @@
 
 pub mod direct;
 pub mod finish;
+mod look;
 pub(crate) mod planes;
 pub mod pool;
 pub mod splat;

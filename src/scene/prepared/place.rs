@@ -8,6 +8,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::{Aabb, Mesh, Similarity};
 use crate::scene::shade;
+use crate::scene::sun_map::{Caster, SunMap};
 
 impl PreparedScene {
     /// Moves an object (object space to world). Its surfels and tree stay as they are; call
@@ -54,6 +55,7 @@ impl PreparedScene {
     /// Cancelled.
     pub fn shade(&mut self, cx: &Context) -> Result<()> {
         self.triangles = bvh(self.objects.iter().map(|o| (&*o.mesh, &o.positions[..])));
+        self.sun_map = self.map_shadows();
         for cloud in &self.clouds[..self.objects.len()] {
             let range = cloud.surfels.start as usize..cloud.surfels.end as usize;
             shade::bake(
@@ -67,6 +69,20 @@ impl PreparedScene {
         }
         self.average();
         Ok(())
+    }
+
+    fn map_shadows(&self) -> SunMap {
+        let objects = self.objects.iter().zip(&self.clouds);
+        let casters: Vec<Caster> = objects
+            .map(|(object, cloud)| Caster {
+                positions: &object.positions,
+                triangles: object.mesh.triangles(),
+                edges: &object.edges,
+                closed: cloud.closed,
+            })
+            .collect();
+        let apart = shade::Sun::new(&self.triangles, &self.light).apart;
+        SunMap::new(&casters, self.light.to_sun, apart)
     }
 }
 

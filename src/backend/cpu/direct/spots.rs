@@ -1,0 +1,327 @@
+//! Pieces of triangles as pixels show them, a lane for each.
+
+use fearless_simd::Simd;
+use glam::{DVec2, Vec3};
+
+use super::Hit;
+use super::painter::{Group, MIDDLES};
+use crate::geometry::lanes::{Real, Vector};
+use crate::visibility::{RayWeights, SAMPLE_EIGHTHS, SAMPLES, SurfaceMesh};
+
+/// Lanes of a batch. A multiple of every vector's; small enough that all of it stays in the first cache.
+pub const LANES: usize = 32;
+
+/// Numbers that an [`super::Appearance`] has interpolated over triangles.
+pub const VALUES: usize = 9;
+
+/// So many of them the light depends on: they come first.
+pub const LIT_VALUES: usize = 6;
+
+/// The values at the corners of a triangle.
+pub type CornerValues = [[f32; VALUES]; 3];
+
+/// A list of [`Spot`]s, transposed: what some samples of a pixel show of one triangle.
+///
+/// The weights of a triangle's corners are proportional to functions that are linear in the picture. These are given in
+/// f32 about a pixel near by, so that they keep the precision that the f64 of [`RayWeights`] gave them.
+#[derive(Debug)]
+pub struct Spots {
+    /// How many lanes are in use. What the others hold is finite and of no interest.
+    pub len: usize,
+    /// Index of the triangle within the object.
+    pub triangle: [u32; LANES],
+    /// The same of the triangle whose light it has.
+    pub lit: [u32; LANES],
+    /// 1 for each sample that is meant, else 0.
+    pub samples: [[f32; LANES]; SAMPLES],
+    /// The sum of those.
+    pub count: [f32; LANES],
+    /// Where the light is asked for: from the pixel's middle, px.
+    middle: [[f32; LANES]; 2],
+    shares: Shares,
+    /// Those of the triangles of `lit`.
+    lit_shares: Shares,
+    /// Pixels from that one.
+    ahead: [f32; LANES],
+    values: [[[f32; LANES]; VALUES]; 3],
+    /// Index of the pixel in the band that is painted.
+    pub(super) pixel: [u32; LANES],
+}
+
+/// The functions at the middle of the first pixel of a row of spots, and their changes per pixel in x and y.
+type Shares = [[[f32; LANES]; 3]; 3];
+
+impl Default for Spots {
+    fn default() -> Self {
+        Self {
+            len: 0,
+            triangle: [0; LANES],
+            lit: [0; LANES],
+            samples: [[0.0; LANES]; SAMPLES],
+            count: [0.0; LANES],
+            middle: [[0.0; LANES]; 2],
+            shares: [[[0.0; LANES]; 3]; 3],
+            lit_shares: [[[0.0; LANES]; 3]; 3],
+            ahead: [0.0; LANES],
+            values: [[[0.0; LANES]; VALUES]; 3],
+            pixel: [0; LANES],
+        }
+    }
+}
+
+/// A row of pixels of which the same samples show the same triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    pub(super) triangle: u32,
+    /// Index of the first pixel in the band.
+    pub(super) pixel: u32,
+    pub(super) pixels: u32,
+    pub(super) samples: Group,
+    /// The triangle whose light it has, and the samples in the middle of which it is asked for.
+    pub(super) lit: (u32, Group),
+}
+
+/// What is the same for all pixels of a [`Spot`].
+pub(super) struct Setup {
+    shares: [[f32; 3]; 3],
+    lit_shares: [[f32; 3]; 3],
+    values: CornerValues,
+}
+
+impl Setup {
+    /// `shown`, `lit`: the triangles; `middle`: of the first pixel, px.
+    pub(super) fn new(shown: &Met, lit: &Met, middle: DVec2) -> Self {
+        let shares = shown.rays.shares_about(middle);
+        let mut values = shown.values;
+        let mut lit_shares = shares;
+        if lit.triangle != shown.triangle {
+            lit_shares = lit.rays.shares_about(middle);
+            for (own, lit) in values.iter_mut().zip(&lit.values) {
+                own[..LIT_VALUES].copy_from_slice(&lit[..LIT_VALUES]);
+            }
+        }
+        Self { shares, lit_shares, values }
+    }
+}
+
+/// A triangle of which something was seen.
+pub(super) struct Met {
+    pub(super) triangle: u32,
+    pub(super) rays: RayWeights,
+    pub(super) values: CornerValues,
+}
+
+impl Spots {
+    /// Adds as many of a spot's pixels as there is room for, from the pixel that is `ahead` of its first one, and returns
+    /// their number.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "parts of pixels")]
+    pub(super) fn push(&mut self, spot: &Spot, setup: &Setup, ahead: u32) -> u32 {
+        let from = self.len;
+        let room = u32::try_from(LANES - from).unwrap_or(0);
+        let added = room.min(spot.pixels - ahead);
+        let to = from + added as usize;
+        for (lane, i) in (from..to).zip(ahead..) {
+            self.pixel[lane] = spot.pixel + i;
+            self.ahead[lane] = i as f32;
+        }
+        self.len = to;
+        // A long row fills batch after batch with the same.
+        if ahead as usize >= LANES && from == 0 {
+            return added;
+        }
+        put(&mut self.triangle, from, to, spot.triangle);
+        put(&mut self.lit, from, to, spot.lit.0);
+        for (sample, lanes) in self.samples.iter_mut().enumerate() {
+            put(lanes, from, to, (spot.samples.0 >> sample & 1) as f32);
+        }
+        put(&mut self.count, from, to, spot.samples.count());
+        for k in 0..2 {
+            put(&mut self.middle[k], from, to, MIDDLES[spot.lit.1.0].0[k] as f32 - 0.5);
+        }
+        for k in 0..3 {
+            for i in 0..3 {
+                put(&mut self.shares[k][i], from, to, setup.shares[k][i]);
+                put(&mut self.lit_shares[k][i], from, to, setup.lit_shares[k][i]);
+            }
+            for (lanes, value) in self.values[k].iter_mut().zip(setup.values[k]) {
+                put(lanes, from, to, value);
+            }
+        }
+        added
+    }
+
+    /// The weights of the corners of `lit` where the light is asked for, in the lanes from `at` on.
+    #[inline(always)]
+    pub fn lit_weights<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [V; 3] {
+        let x = V::load(simd, &self.middle[0][at..]);
+        let y = V::load(simd, &self.middle[1][at..]);
+        self.weights(simd, at, &self.lit_shares, [x, y])
+    }
+
+    /// The weights of the corners in the middle of the samples, in the lanes from `at` on.
+    #[inline(always)]
+    pub fn own_weights<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [V; 3] {
+        let (mut x, mut y) = (V::broadcast(simd, 0.0), V::broadcast(simd, 0.0));
+        for (sample, lanes) in self.samples.iter().enumerate() {
+            let covered = V::load(simd, &lanes[at..]);
+            let [dx, dy] = from_middle(sample);
+            (x, y) = (x + covered * dx, y + covered * dy);
+        }
+        let count = V::load(simd, &self.count[at..]).max(V::broadcast(simd, 1.0));
+        self.weights(simd, at, &self.shares, [x / count, y / count])
+    }
+
+    /// The weights of the corners at one of the samples of a pixel, in the lanes from `at` on.
+    #[inline(always)]
+    pub fn sample_weights<S: Simd, V: Vector<S>>(
+        &self,
+        simd: S,
+        at: usize,
+        sample: usize,
+    ) -> [V; 3] {
+        let [x, y] = from_middle(sample);
+        let place = [V::broadcast(simd, x), V::broadcast(simd, y)];
+        self.weights(simd, at, &self.shares, place)
+    }
+
+    /// At a place that is given from the pixels' middles (px).
+    #[inline(always)]
+    fn weights<S: Simd, V: Vector<S>>(
+        &self,
+        simd: S,
+        at: usize,
+        shares: &Shares,
+        [x, y]: [V; 2],
+    ) -> [V; 3] {
+        let place = [x + V::load(simd, &self.ahead[at..]), y];
+        normalized([
+            share(simd, at, shares, 0, place),
+            share(simd, at, shares, 1, place),
+            share(simd, at, shares, 2, place),
+        ])
+    }
+
+    /// Three of the values at points of the lanes from `at` on: of `lit` below [`LIT_VALUES`].
+    #[inline(always)]
+    pub fn values<S: Simd, V: Vector<S>>(
+        &self,
+        simd: S,
+        at: usize,
+        weights: [V; 3],
+        first: usize,
+    ) -> [V; 3] {
+        [
+            self.value(simd, at, weights, first),
+            self.value(simd, at, weights, first + 1),
+            self.value(simd, at, weights, first + 2),
+        ]
+    }
+
+    #[inline(always)]
+    fn value<S: Simd, V: Vector<S>>(&self, simd: S, at: usize, weights: [V; 3], i: usize) -> V {
+        let [a, b, c] = &self.values;
+        V::load(simd, &a[i][at..]) * weights[0]
+            + V::load(simd, &b[i][at..]) * weights[1]
+            + V::load(simd, &c[i][at..]) * weights[2]
+    }
+
+    /// Where the light of one lane is asked for.
+    pub fn lit_hit(&self, mesh: &SurfaceMesh, object: usize, lane: usize) -> Hit {
+        let place = [self.middle[0][lane], self.middle[1][lane]];
+        self.hit(mesh, object, self.lit[lane], &self.lit_shares, lane, place)
+    }
+
+    /// The point at a sample of one lane.
+    pub fn sample_hit(&self, mesh: &SurfaceMesh, object: usize, lane: usize, sample: usize) -> Hit {
+        let place = from_middle(sample);
+        self.hit(mesh, object, self.triangle[lane], &self.shares, lane, place)
+    }
+
+    fn hit(
+        &self,
+        mesh: &SurfaceMesh,
+        object: usize,
+        triangle: u32,
+        shares: &Shares,
+        lane: usize,
+        [x, y]: [f32; 2],
+    ) -> Hit {
+        let x = x + self.ahead[lane];
+        let [start, by_x, by_y] = shares;
+        let share = |k: usize| (start[k][lane] + by_x[k][lane] * x + by_y[k][lane] * y).max(0.0);
+        let weights = normalized([share(0), share(1), share(2)]);
+        let triangle = triangle as usize;
+        let [a, b, c] = mesh.corners(triangle);
+        Hit { object, triangle, weights, point: a * weights[0] + b * weights[1] + c * weights[2] }
+    }
+}
+
+/// Most rows of spots on fine meshes are of one pixel.
+#[inline(always)]
+fn put<T: Copy>(lanes: &mut [T; LANES], from: usize, to: usize, value: T) {
+    if to - from == 1 {
+        lanes[from] = value;
+    } else {
+        lanes[from..to].fill(value);
+    }
+}
+
+/// One of the functions. Where the view ray passes the triangle, which it does by less than a pixel, negative ones are
+/// taken for zero.
+#[inline(always)]
+fn share<S: Simd, V: Vector<S>>(
+    simd: S,
+    at: usize,
+    shares: &Shares,
+    k: usize,
+    [x, y]: [V; 2],
+) -> V {
+    let start = V::load(simd, &shares[0][k][at..]);
+    let by_x = V::load(simd, &shares[1][k][at..]);
+    let by_y = V::load(simd, &shares[2][k][at..]);
+    (start + by_x * x + by_y * y).max(V::broadcast(simd, 0.0))
+}
+
+/// The same with the sum 1, whatever they are.
+#[inline(always)]
+fn normalized<R: Real<Scalar = f32>>(shares: [R; 3]) -> [R; 3] {
+    let sum = shares[0] + shares[1] + shares[2];
+    let (one, third) = (sum.splat(1.0), sum.splat(1.0 / 3.0));
+    let some = sum.splat(0.0).lt(sum);
+    let scale = one / R::select(some, sum, one);
+    [
+        R::select(some, shares[0] * scale, third),
+        R::select(some, shares[1] * scale, third),
+        R::select(some, shares[2] * scale, third),
+    ]
+}
+
+/// From the pixel's middle to a sample, px.
+fn from_middle(sample: usize) -> [f32; 2] {
+    SAMPLE_EIGHTHS[sample].map(|eighths| f32::from(eighths) / 8.0 - 0.5)
+}
+
+/// Radiances, transposed.
+pub type Colors = [[f32; LANES]; 3];
+
+/// One of them.
+pub(super) fn color(colors: &Colors, lane: usize) -> Vec3 {
+    Vec3::new(colors[0][lane], colors[1][lane], colors[2][lane])
+}
+
+/// Pieces of sky, a lane for each.
+#[derive(Debug)]
+pub(super) struct SkySpots {
+    pub(super) len: usize,
+    /// Picture positions, from the picture's middle in focal lengths.
+    pub(super) place: [[f32; LANES]; 2],
+    pub(super) count: [f32; LANES],
+    pub(super) pixel: [u32; LANES],
+}
+
+impl Default for SkySpots {
+    fn default() -> Self {
+        Self { len: 0, place: [[0.0; LANES]; 2], count: [0.0; LANES], pixel: [0; LANES] }
+    }
+}
