@@ -94,6 +94,8 @@ struct Window {
     course: Option<Course>,
     /// Where a picture of the window is to be written; gone once it was asked for.
     screenshot: Option<PathBuf>,
+    /// Everything is measured: it closes soon.
+    closing: bool,
     remembers: bool,
     left: Left,
     scale: f32,
@@ -115,6 +117,7 @@ impl Window {
             viewer: Viewer::new(&cc.egui_ctx, opening, settings),
             course: frames.map(|frames| Course::new(frames, opening.started)),
             screenshot: opening.screenshot.clone(),
+            closing: false,
             remembers,
             left,
         }
@@ -132,6 +135,10 @@ impl Window {
     }
 
     fn measure(&mut self, context: &egui::Context) {
+        if self.closing {
+            // The picture of the window comes with one of the next passes.
+            context.request_repaint();
+        }
         let Some(course) = &mut self.course else { return };
         let done = course.step(&mut self.viewer);
         self.viewer.wish(context);
@@ -158,6 +165,7 @@ impl Window {
         if let Some(outcome) = outcome {
             self.leave(Ok(outcome));
         }
+        self.closing = true;
         match self.screenshot.take() {
             Some(path) => shoot(context, path, Arc::clone(&self.left)),
             None => context.send_viewport_cmd(ViewportCommand::Close),
