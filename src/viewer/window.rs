@@ -141,8 +141,8 @@ impl Window {
         }
         let Some(course) = &mut self.course else { return };
         let done = course.step(&mut self.viewer);
+        // No more passes than pictures: painting the window takes time from what is measured.
         self.viewer.wish(context);
-        context.request_repaint();
         if let Some((what, true, _)) = &self.viewer.message {
             let error = Error::input("view", "", what.clone(), "see `catoptric view --help`");
             self.leave(Err(error));

@@ -20,7 +20,7 @@ pub const LIT_VALUES: usize = 6;
 /// The values at the corners of a triangle.
 pub type CornerValues = [[f32; VALUES]; 3];
 
-/// A list of [`Spot`]s, transposed: what some samples of a pixel show of one triangle.
+/// A list of `Spot`s, transposed: what some samples of a pixel show of one triangle.
 ///
 /// The weights of a triangle's corners are proportional to functions that are linear in the picture. These are given in
 /// f32 about a pixel near by, so that they keep the precision that the f64 of [`RayWeights`] gave them.
