@@ -12,7 +12,7 @@ use glam::DVec3;
 use super::gizmo::Handles;
 use super::settings::{Settings, Shown};
 use super::worker::{
-    Event, LoadRequest, Map, Prepared, Probe, Probed, Save, Shot, Thing, View, What, Worker,
+    Event, LoadRequest, Map, Prepared, Probe, Probed, Save, Saved, Shot, Thing, View, What, Worker,
 };
 use super::{Opening, canvas, navigation, panels};
 use crate::camera::eye::ImageSize;
@@ -63,8 +63,9 @@ pub(super) struct Viewer {
     loaded: (PrepareOptions, Option<usize>),
     /// The open scene has been sampled again: things lie where they were put.
     is_prepared_anew: bool,
-    /// Where the scene came from.
+    /// Where the scene came from, and what is to be opened instead.
     pub(super) request: Request,
+    opened: Option<Request>,
     /// As it was read.
     pub(super) scene: Option<Arc<Scene>>,
     /// Where its objects, then its mirrors are now.
@@ -119,6 +120,7 @@ impl Viewer {
             loaded: (opening.prepare, None),
             is_prepared_anew: false,
             request: opening.request.clone(),
+            opened: None,
             scene: None,
             placements: Arc::default(),
             prepared: None,
@@ -164,8 +166,10 @@ impl Viewer {
             match event {
                 Event::Progress(progress) => self.progress = progress,
                 Event::Failed(what) => self.tell(what, true),
-                Event::Read(scene) => self.read(scene),
-                Event::Ready(prepared) => {
+                Event::Ready(prepared, scene) => {
+                    if self.generation() != Some(prepared.generation) {
+                        self.read(scene);
+                    }
                     self.prepared = Some(*prepared);
                     // Even if nothing moved, there is something new to draw.
                     self.posted = None;
@@ -183,8 +187,8 @@ impl Viewer {
         while let Ok(chosen) = self.chosen.1.try_recv() {
             match chosen {
                 Chosen::Open(files) => self.open(&files),
-                Chosen::Picture(path) => self.save(path, None),
-                Chosen::Aov(path) => self.save(path.with_extension("png"), Some(path)),
+                Chosen::Picture(path) => self.save(Saved::Picture, path),
+                Chosen::Aov(path) => self.save(Saved::Planes, path),
                 Chosen::Scene(path) => self.save_scene(&path),
             }
         }
@@ -199,7 +203,18 @@ impl Viewer {
         self.message.as_ref().is_some_and(|(_, is_bad, at)| *is_bad || at.elapsed() < MESSAGE)
     }
 
+    /// Which of the loaded scenes is shown.
+    fn generation(&self) -> Option<u64> {
+        self.prepared.as_ref().map(|p| p.generation)
+    }
+
+    /// Another scene is there.
     fn read(&mut self, scene: Arc<Scene>) {
+        if let Some(request) = self.opened.take() {
+            self.request = request;
+            self.is_prepared_anew = false;
+            self.mirror_triangles = None;
+        }
         let objects = scene.objects.iter().map(|o| o.transform);
         let placements = objects.chain(scene.mirrors.iter().map(|m| m.transform)).collect();
         self.placements = Arc::new(placements);
@@ -216,23 +231,24 @@ impl Viewer {
     pub(super) fn open(&mut self, files: &[PathBuf]) {
         let inputs = files.iter().map(|f| f.to_string_lossy().into_owned()).collect();
         self.takes_eye = true;
-        self.is_prepared_anew = false;
-        self.mirror_triangles = None;
-        self.request = Request { inputs, ..Request::default() };
-        self.load(What::Request(self.request.clone()));
+        // What is open stays, and keeps its name, until the other is there.
+        let request = Request { inputs, ..Request::default() };
+        self.opened = Some(request.clone());
+        self.load(What::Request(request), None);
     }
 
     /// Samples the open scene anew, with what the sliders say.
     pub(super) fn prepare_again(&mut self) {
         if let Some(scene) = self.as_placed() {
             self.is_prepared_anew = self.is_changed();
-            self.load(What::Open(Arc::new(scene)));
+            (self.takes_eye, self.opened) = (false, None);
+            self.load(What::Open(Arc::new(scene)), self.mirror_triangles);
         }
     }
 
-    fn load(&mut self, what: What) {
+    fn load(&mut self, what: What, mirror_triangles: Option<usize>) {
         self.message = None;
-        let (prepare, mirror_triangles) = (self.prepare, self.mirror_triangles);
+        let prepare = self.prepare;
         self.loaded = (prepare, mirror_triangles);
         self.worker.load(LoadRequest { what, prepare, mirror_triangles });
     }
@@ -261,9 +277,9 @@ impl Viewer {
         }
     }
 
-    pub(super) fn save(&mut self, path: PathBuf, aov: Option<PathBuf>) {
+    pub(super) fn save(&mut self, what: Saved, path: PathBuf) {
         let view = self.wanted(true, 1.0);
-        self.worker.save(Save { path, aov, view });
+        self.worker.save(Save { what, path, view });
     }
 
     fn take(&mut self, context: &egui::Context, shot: Shot) {
@@ -344,12 +360,13 @@ impl Viewer {
             }
         }
         let map = match (self.settings.compare, self.settings.shown) {
-            (true, Shown::Difference) => Map::Difference,
+            (true, Shown::Difference) if rest => Map::Difference,
             (true, Shown::Flip) if rest => Map::Flip,
             (false, _) if self.settings.costs && rest => Map::Cost,
             _ => Map::None,
         };
         View {
+            generation: self.generation().unwrap_or(0),
             eye: self.eye,
             size: ImageSize { width: side(self.size.width), height: side(self.size.height) },
             sides,

@@ -3,7 +3,7 @@
 use eframe::egui::{Key, Modifiers, PointerButton};
 use egui_kittest::kittest::Queryable;
 
-use super::super::worker::Thing;
+use super::super::worker::{Saved, Thing};
 use super::*;
 use crate::scene::file;
 use crate::{Context, geometry::Similarity};
@@ -124,7 +124,7 @@ fn a_moved_mirror_is_drawn_as_if_it_had_always_been_there() {
     let shots = viewer(&hands).shots;
     until(&mut hands, "new shadows", |v| v.shots > shots);
     let picture = folder.path().join("moved.png");
-    viewer_mut(&mut hands).save(picture.clone(), None);
+    viewer_mut(&mut hands).save(Saved::Picture, picture.clone());
     until(&mut hands, "a file", |_| picture.exists());
     // What is saved as a scene is the same picture, drawn by the library.
     let scene = viewer(&hands).as_placed().expect("a scene");
@@ -172,6 +172,8 @@ fn a_bad_file_says_so_and_the_scene_stays() {
     until(&mut hands, "a message", |v| v.message.as_ref().is_some_and(|(_, is_bad, _)| *is_bad));
     let (text, ..) = viewer(&hands).message.clone().expect("it is there");
     assert!(text.contains("bad.ply"), "{text}");
+    let small = path.to_string_lossy().into_owned();
+    assert_eq!(viewer(&hands).request.inputs, [small], "the command is still that of what is seen");
     assert_eq!(viewer(&hands).scene.as_ref().map(|s| s.name.as_str()), Some("small"));
     let before = viewer(&hands).shots;
     viewer_mut(&mut hands).eye.position.x += 0.2;
@@ -180,6 +182,21 @@ fn a_bad_file_says_so_and_the_scene_stays() {
     hands.key_press(Key::Escape);
     hands.step();
     assert!(viewer(&hands).message.is_none());
+}
+
+#[test]
+fn saving_planes_touches_no_other_file() {
+    let (folder, path) = small();
+    let mut hands = opened(&path, [400.0, 300.0], without_panel());
+    hands.step();
+    until_drawn(&mut hands);
+    let [picture, planes] = ["kept.png", "kept.exr"].map(|name| folder.path().join(name));
+    std::fs::write(&picture, "mine").expect("it is written");
+    viewer_mut(&mut hands).save(Saved::Planes, planes.clone());
+    until(&mut hands, "a file", |_| planes.exists());
+    let (seen, _) = crate::image::aov::read_aov(&planes).expect("it reads");
+    assert!(seen.mirror.contains(&0));
+    assert_eq!(std::fs::read(&picture).expect("it is there"), b"mine");
 }
 
 #[test]

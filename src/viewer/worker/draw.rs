@@ -9,7 +9,8 @@ use eframe::egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
 use super::{
-    Arrived, BackendChoice, Event, Inbox, Map, Prepared, Save, Shared, Shot, Side, View, probe,
+    Arrived, BackendChoice, Event, Inbox, Map, Prepared, Save, Saved, Shared, Shot, Side, View,
+    probe,
 };
 use crate::backend::{Backend, cpu::Cpu, fastest, gpu};
 use crate::camera::Eye;
@@ -132,7 +133,7 @@ impl Artist {
     }
 
     fn arrive(&mut self, arrived: Arrived) {
-        let Arrived { scene, prepared, placements } = arrived;
+        let Arrived { scene, source, prepared, placements } = arrived;
         if let Some(stage) = &mut self.scene {
             stage.stop_shading();
         }
@@ -144,7 +145,7 @@ impl Artist {
             shading: None,
         });
         self.last = None;
-        self.shared.tell(Event::Ready(Box::new(prepared)));
+        self.shared.tell(Event::Ready(Box::new(prepared), source));
     }
 
     fn relight(&mut self, generation: u64, scene: PreparedScene, lit: Arc<Vec<Similarity>>) {
@@ -168,6 +169,9 @@ impl Artist {
 
     fn draw(&mut self, view: Arc<View>, cx: &Context) -> Result<()> {
         let Some(stage) = &mut self.scene else { return Ok(()) };
+        if view.generation != stage.prepared.generation {
+            return Ok(());
+        }
         stage.place(&view.placements);
         let start = Instant::now();
         let eye = view_eye(&stage.scene, &view)?;
@@ -228,30 +232,30 @@ impl Artist {
 
     /// Draws it anew, to its end: the picture of a file is no preview.
     fn save(&mut self, save: Save) -> Result<()> {
-        let Some(stage) = &mut self.scene else { return Ok(()) };
-        stage.place(&save.view.placements);
-        let eye = view_eye(&stage.scene, &save.view)?;
-        let Some(side) = save.view.sides.first() else { return Ok(()) };
+        let Save { what, path, view } = save;
+        let (Some(stage), Some(side)) = (&mut self.scene, view.sides.first()) else {
+            return Ok(());
+        };
+        if view.generation != stage.prepared.generation {
+            return Ok(());
+        }
+        stage.place(&view.placements);
+        let eye = view_eye(&stage.scene, &view)?;
         let mut renderer = Renderer::on(backend(side)?);
-        if !save.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
             renderer.keep_bright();
         }
-        let cx = Context::default();
-        renderer.render(
-            &stage.scene,
-            &eye,
-            chosen(side)?,
-            &side.params,
-            save.aov.is_some(),
-            &cx,
-        )?;
-        write_picture(&save.path, renderer.picture())?;
-        self.shared.tell(Event::Saved(save.path));
-        if let (Some(path), Some(planes)) = (save.aov, renderer.planes()) {
-            let names: Vec<String> = stage.scene.objects.iter().map(|o| o.name.clone()).collect();
-            write_aov(&path, planes, &names)?;
-            self.shared.tell(Event::Saved(path));
+        let (how, planes) = (chosen(side)?, what == Saved::Planes);
+        renderer.render(&stage.scene, &eye, how, &side.params, planes, &Context::default())?;
+        match (what, renderer.planes()) {
+            (Saved::Planes, Some(planes)) => {
+                let objects = &stage.scene.objects;
+                let names: Vec<String> = objects.iter().map(|o| o.name.clone()).collect();
+                write_aov(&path, planes, &names)?;
+            }
+            _ => write_picture(&path, renderer.picture())?,
         }
+        self.shared.tell(Event::Saved(path));
         Ok(())
     }
 }

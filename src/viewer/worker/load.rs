@@ -75,9 +75,6 @@ fn load(request: &LoadRequest, generation: u64, shared: &Shared, cx: &Context) -
     };
     let scene = Arc::new(with_triangles(scene, request.mirror_triangles));
     let load_ms = milliseconds(start);
-    if shared.is_newest(generation) {
-        shared.tell(Event::Read(Arc::clone(&scene)));
-    }
     let placements: Vec<Similarity> =
         scene.objects.iter().map(|o| o.transform).chain(mirrors(&scene)).collect();
     let placements = Arc::new(placements);
@@ -100,7 +97,8 @@ fn load(request: &LoadRequest, generation: u64, shared: &Shared, cx: &Context) -
         if !shared.is_newest(generation) {
             return Err(Error::Cancelled);
         }
-        let arrived = Arrived { scene: ready, prepared, placements: Arc::clone(&placements) };
+        let (source, placements) = (Arc::clone(&scene), Arc::clone(&placements));
+        let arrived = Arrived { scene: ready, source, prepared, placements };
         shared.post(|inbox| inbox.scene = Some(Box::new(arrived)));
     }
     Ok(())

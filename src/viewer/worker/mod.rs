@@ -74,6 +74,8 @@ pub(super) enum Map {
 /// What is to be seen.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct View {
+    /// Of which scene: see [`Prepared::generation`]. A wish for another is out of date.
+    pub(super) generation: u64,
     pub(super) eye: EyeDescription,
     pub(super) size: ImageSize,
     pub(super) sides: Vec<Side>,
@@ -128,9 +130,8 @@ pub struct Prepared {
 pub(super) enum Event {
     /// Something takes long: what, and how much of it is done; `None` once it has ended.
     Progress(Option<(String, f64)>),
-    /// A scene was read: what it consists of, before it is ready.
-    Read(Arc<Scene>),
-    Ready(Box<Prepared>),
+    /// From now on this is drawn, made from that.
+    Ready(Box<Prepared>, Arc<Scene>),
     /// For people: what failed.
     Failed(String),
     Shot(Box<Shot>),
@@ -138,18 +139,27 @@ pub(super) enum Event {
     Saved(PathBuf),
 }
 
+/// What of a picture is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Saved {
+    Picture,
+    /// What every mirror pixel shows.
+    Planes,
+}
+
 /// A picture to be written.
 #[derive(Clone, Debug)]
 pub(super) struct Save {
+    pub(super) what: Saved,
     pub(super) path: PathBuf,
-    /// Also what every mirror pixel shows.
-    pub(super) aov: Option<PathBuf>,
     pub(super) view: View,
 }
 
 /// A scene on its way to the renderer.
 struct Arrived {
     scene: PreparedScene,
+    /// What it was made from.
+    source: Arc<Scene>,
     prepared: Prepared,
     placements: Arc<Vec<Similarity>>,
 }
