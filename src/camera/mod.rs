@@ -2,6 +2,7 @@
 
 pub mod eye;
 pub mod mirror_ray;
+pub mod reflector;
 pub mod three_ray;
 
 pub use eye::Eye;

@@ -1,0 +1,106 @@
+//! Star-shaped reflectors as maps of the direction from a centre, and the two searches for the point of a reflector
+//! at which a given point is seen: Estalella et al. 2005 and Roger & Holzschuch 2006.
+//!
+//! All points are relative to the reflector's centre, in scene units and axes. `shaders/camera/reflector/` holds the
+//! twins.
+
+pub mod cube;
+pub mod estalella;
+#[cfg(test)]
+pub(crate) mod exact;
+pub mod roger;
+#[cfg(test)]
+mod tests;
+
+use glam::Vec3;
+
+use self::cube::CubeMap;
+
+/// A reflector that every ray from a centre meets once, by direction.
+#[derive(Clone, Debug)]
+pub struct ReflectorMap {
+    /// Point and unit normal (mirror side): what Estalella et al. read (section 4.1).
+    pub surface: CubeMap<6>,
+    /// The radius r and, before it, its gradient over the unit sphere: what Roger & Holzschuch read (section 3.3.1).
+    pub radial: CubeMap<4>,
+    /// The mirror side is the one towards the centre.
+    pub inward: bool,
+}
+
+/// Where a point is seen in a reflector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// The reflection point R, relative to the centre.
+    pub point: Vec3,
+    /// Unit normal there.
+    pub normal: Vec3,
+    /// Steps that the search took.
+    pub steps: u32,
+}
+
+impl Found {
+    /// How far before the reflector's tangent plane a point lies.
+    pub fn height(&self, point: Vec3) -> f32 {
+        (point - self.point).dot(self.normal)
+    }
+
+    /// A point mirrored in the tangent plane: the virtual vertex (Estalella et al. section 3).
+    pub fn mirrored(&self, point: Vec3) -> Vec3 {
+        point - self.normal * (2.0 * self.height(point))
+    }
+}
+
+impl ReflectorMap {
+    /// Of the radii and unit normals (mirror side) in [`cube::directions`].
+    ///
+    /// # Panics
+    /// If their number is not that of a map with this side.
+    pub fn new(side: u32, surface: &[(f32, Vec3)], inward: bool) -> Self {
+        let directions = cube::directions(side);
+        let points = directions.iter().zip(surface).map(|(&u, &(r, n))| {
+            let p = u * r;
+            [p.x, p.y, p.z, n.x, n.y, n.z]
+        });
+        let radii = directions.iter().zip(surface).map(|(&u, &(r, n))| {
+            let g = radial_gradient(u, r, n);
+            [g.x, g.y, g.z, r]
+        });
+        Self {
+            surface: CubeMap::new(side, points.collect()),
+            radial: CubeMap::new(side, radii.collect()),
+            inward,
+        }
+    }
+
+    /// The radius in a direction of any length.
+    pub fn radius(&self, direction: Vec3) -> f32 {
+        self.radial.at(direction)[3]
+    }
+
+    /// The point and unit normal (mirror side) in a direction of any length.
+    #[inline(always)]
+    pub fn surface_at(&self, direction: Vec3) -> (Vec3, Vec3) {
+        let [x, y, z, a, b, c] = self.surface.at(direction);
+        (Vec3::new(x, y, z), Vec3::new(a, b, c).normalize_or(Vec3::Y))
+    }
+
+    /// Where a search begins for a point in this unit direction; in a hollow mirror the opposite direction, if the eye does not
+    /// see the mirror side there.
+    fn foot_direction(&self, eye: Vec3, direction: Vec3) -> Vec3 {
+        let (point, normal) = self.surface_at(direction);
+        let behind = self.inward && normal.dot(eye - point) < 0.0;
+        if behind { -direction } else { direction }
+    }
+}
+
+/// Normals further than this from the radius (its cosine) have no gradient that f32 could hold.
+const LEAST_SLOPE: f32 = 0.02;
+
+/// The gradient of r over the unit sphere at `u` where the surface has this normal: the surface r(u) u has the normal
+/// r u - ∇r.
+fn radial_gradient(u: Vec3, r: f32, normal: Vec3) -> Vec3 {
+    let along = normal.dot(u);
+    let along = if along < 0.0 { along.min(-LEAST_SLOPE) } else { along.max(LEAST_SLOPE) };
+    let gradient = (u - normal / along) * r;
+    gradient - u * gradient.dot(u)
+}
