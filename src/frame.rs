@@ -10,7 +10,7 @@ use crate::camera::Eye;
 use crate::context::Context;
 use crate::error::Result;
 use crate::image::{Picture, Planes};
-use crate::methods::{FrameInput, Made, Method, Params};
+use crate::methods::{FrameInput, Made, Method, Params, Value};
 use crate::plan::{Plan, Reflection};
 use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::{self, NONE_ID, Visibility};
@@ -55,6 +55,8 @@ pub struct FrameReport {
     pub composite_ms: Option<f64>,
     /// All of it, wall time.
     pub frame_ms: Option<f64>,
+    /// What the method cannot show in this scene, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl FrameReport {
@@ -98,6 +100,8 @@ pub struct Renderer {
     reflection: Reflection,
     picture: Picture,
     white: f32,
+    /// The last method's, with what it depends on.
+    made: Option<((&'static str, u64, Vec<Value>), Made)>,
 }
 
 impl Default for Renderer {
@@ -121,6 +125,7 @@ impl Renderer {
             reflection: Reflection::default(),
             picture: Picture::black(0, 0),
             white: 1.0,
+            made: None,
         }
     }
 
@@ -142,8 +147,7 @@ impl Renderer {
         planes: bool,
         cx: &Context,
     ) -> Result<FrameReport> {
-        method.qualify(scene, params)?;
-        let made = method.prepare(scene, params, cx)?;
+        let made = self.prepared(scene, method, params, cx)?;
         let start = Instant::now();
         let ids_ms = self.see(scene, eye);
         cx.check()?;
@@ -155,6 +159,31 @@ impl Renderer {
         report.composite_ms = Some(milliseconds(composite));
         report.frame_ms = Some(milliseconds(start));
         Ok(report)
+    }
+
+    /// What the method makes once a scene, made anew only when it has to be.
+    ///
+    /// # Errors
+    /// The method cannot draw this scene, or the work was cancelled.
+    pub fn prepared(
+        &mut self,
+        scene: &PreparedScene,
+        method: &dyn Method,
+        params: &Params,
+        cx: &Context,
+    ) -> Result<Made> {
+        let values = method.prepares_with().iter().filter_map(|id| params.get(id)).collect();
+        let key = (method.info().id, method.version(scene), values);
+        if let Some((of, made)) = &self.made
+            && *of == key
+        {
+            return Ok(Made::clone(made));
+        }
+        self.made = None;
+        method.qualify(scene, params)?;
+        let made = method.prepare(scene, params, cx)?;
+        self.made = Some((key, Made::clone(&made)));
+        Ok(made)
     }
 
     /// The first stage: what the eye sees directly. Returns its milliseconds.
@@ -186,24 +215,23 @@ impl Renderer {
         let planned_ms = milliseconds(start);
         let done =
             self.backend.execute(&plan, scene, &self.visibility, planes, &mut self.reflection)?;
-        // Only splat passes have cameras, batches and pairs.
-        let splats = done.passes_ms.is_some();
         let report = FrameReport {
             method: method.info().id,
             backend: self.backend.id(),
             device: self.backend.device(),
-            cameras: splats.then_some(done.cameras),
-            batches: splats.then_some(done.batches),
-            projections: splats.then_some(done.projections),
+            cameras: done.cameras,
+            batches: done.batches,
+            projections: done.projections,
             valid: done.valid,
             mirror_pixels: self.visibility.mirror_ids.iter().filter(|&&id| id != NONE_ID).count(),
             covered_pixels: self.reflection.coverage.iter().filter(|&&c| c >= 0.5).count(),
-            cameras_ms: splats.then_some(plan.times.cameras_ms),
+            cameras_ms: done.cameras.map(|_| plan.times.cameras_ms),
             cull_ms: done.cull_ms,
             project_ms: done.project_ms,
             splat_ms: done.splat_ms,
             layer_ms: done.passes_ms.map(|ms| ms + planned_ms),
             rays_ms: done.rays_ms,
+            notes: plan.notes.into_iter().chain(done.notes.iter().cloned()).collect(),
             ..FrameReport::default()
         };
         Ok((report, done))

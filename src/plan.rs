@@ -1,6 +1,15 @@
 //! A frame as data: passes over named resources, in order. Methods write plans, backends execute them.
 
+pub mod search;
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use crate::camera::Eye;
+use crate::camera::reflector::cube::CubeMap;
 use crate::camera::three_ray::{ThreeRay, ViewVolume};
+use crate::geometry::Aabb;
 use crate::visibility::Patch;
 
 /// One camera: a patch of a mirror and an object, in the object's space.
@@ -184,6 +193,43 @@ pub struct GatherTimes {
     pub rays: usize,
 }
 
+/// What is around a mirror, seen from its centre.
+#[derive(Clone, Debug)]
+pub struct EnvironmentCube {
+    /// Scene space.
+    pub center: Vec3,
+    /// Linear RGB radiance of the objects times their coverage, and that.
+    pub radiance: CubeMap<4>,
+    /// By texel: the object's triangle over all objects, and where on it.
+    pub seen: Vec<Option<(u32, [f32; 3])>>,
+}
+
+/// Looks reflections up by the direction of the reflected ray.
+pub struct LookupPass<'a> {
+    /// The eye.
+    pub eye: &'a Eye,
+    /// By mirror.
+    pub cubes: Arc<Vec<EnvironmentCube>>,
+    /// Where the reflected ray leaves this box (scene space) is what it sees; `None`: infinitely far away.
+    pub walls: Option<Aabb>,
+}
+
+impl LookupPass<'_> {
+    /// The direction in which a ray from `origin` (scene space) is looked up in a mirror's cube.
+    pub fn direction(&self, mirror: usize, origin: Vec3, direction: Vec3) -> Vec3 {
+        let Some(walls) = self.walls else { return direction };
+        let far = Vec3::select(direction.cmpgt(Vec3::ZERO), walls.max, walls.min);
+        let t = ((far - origin) / direction).map(|t| if t.is_finite() { t } else { f32::INFINITY });
+        let t = t.min_element();
+        // Outside of the box there is no wall.
+        if t > 0.0 && t.is_finite() {
+            origin + direction * t - self.cubes[mirror].center
+        } else {
+            direction
+        }
+    }
+}
+
 /// The reflection of all mirrors: one element a pixel of the picture, by row.
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
@@ -216,13 +262,19 @@ pub enum Pass<'a> {
     Resolve,
     /// Ids → Reflection.
     Gather(GatherPass<'a>),
+    /// Ids → Reflection.
+    Lookup(LookupPass<'a>),
+    /// Ids → Reflection.
+    Search(Box<search::SearchPass<'a>>),
 }
 
 impl Pass<'_> {
     /// What must be there before.
     pub fn reads(&self) -> &'static [Resource] {
         match self {
-            Self::Splat(_) | Self::Gather(_) => &[Resource::Ids],
+            Self::Splat(_) | Self::Gather(_) | Self::Lookup(_) | Self::Search(_) => {
+                &[Resource::Ids]
+            }
             Self::Resolve => &[Resource::Keys],
         }
     }
@@ -231,7 +283,9 @@ impl Pass<'_> {
     pub fn writes(&self) -> &'static [Resource] {
         match self {
             Self::Splat(_) => &[Resource::Keys],
-            Self::Resolve | Self::Gather(_) => &[Resource::Reflection],
+            Self::Resolve | Self::Gather(_) | Self::Lookup(_) | Self::Search(_) => {
+                &[Resource::Reflection]
+            }
         }
     }
 }
@@ -243,6 +297,8 @@ pub struct Plan<'a> {
     pub passes: Vec<Pass<'a>>,
     /// Time spent on planning, by stage.
     pub times: PlanTimes,
+    /// What the method cannot show in this scene, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// What planning took, milliseconds.

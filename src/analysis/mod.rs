@@ -30,7 +30,7 @@ fn splat_pass<'a>(
     C3rc.plan(FrameInput { scene, eye, visibility }, &(Arc::new(()) as _), params, &mut plan)?;
     let splats = plan.passes.into_iter().find_map(|pass| match pass {
         Pass::Splat(pass) => Some(pass),
-        Pass::Resolve | Pass::Gather(_) => None,
+        Pass::Resolve | Pass::Gather(_) | Pass::Lookup(_) | Pass::Search(_) => None,
     });
     Ok(splats.expect("the method splats"))
 }

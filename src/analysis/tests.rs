@@ -42,6 +42,7 @@ fn scene(surfels: usize) -> PreparedScene {
         source: None,
         transform,
         tint: Vec3::ONE,
+        proxy: None,
     };
     let scene = Scene {
         name: "test".into(),

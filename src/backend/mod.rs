@@ -85,17 +85,17 @@ impl Backend for WithSpare {
 }
 
 /// What executing a plan did and took. A stage that was not timed apart is `None`.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct ExecuteReport {
     /// Cameras of the splat passes.
-    pub cameras: usize,
+    pub cameras: Option<usize>,
     /// Visible patches of the splat passes.
     pub patches: usize,
     /// Batches of surfels.
-    pub batches: u64,
-    /// Camera–surfel pairs projected.
-    pub projections: u64,
-    /// Pairs that have an image in the camera, where they are counted.
+    pub batches: Option<u64>,
+    /// Camera–surfel pairs projected, or points searched for on a reflector.
+    pub projections: Option<u64>,
+    /// Those that have an image, where they are counted.
     pub valid: Option<u64>,
     /// Culling, milliseconds of all threads together by their number.
     pub cull_ms: Option<f64>,
@@ -107,6 +107,8 @@ pub struct ExecuteReport {
     pub passes_ms: Option<f64>,
     /// Wall time of tracing reflected rays, milliseconds.
     pub rays_ms: Option<f64>,
+    /// What could not be shown, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Something that executes plans. It keeps its memory between frames.

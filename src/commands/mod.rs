@@ -49,6 +49,10 @@ pub(crate) struct SceneArgs {
     /// Mirror: a mesh file, used as placed, or a built-in shape; repeatable
     #[arg(long, value_name = "FILE|NAME")]
     mirror: Vec<String>,
+    /// What stands for a mirror where a method needs a closed, star-shaped one (estalella, roger-holzschuch): a mesh file in
+    /// the mirror's own space, or a built-in shape, made as large as the mirror; repeatable, in the mirrors' order
+    #[arg(long, value_name = "FILE|NAME")]
+    proxy: Vec<String>,
     /// Object: a mesh file, used as placed, or a built-in shape; repeatable
     #[arg(long, value_name = "FILE|NAME")]
     object: Vec<String>,
@@ -119,6 +123,7 @@ impl SceneArgs {
         Self {
             inputs: Vec::new(),
             mirror: Vec::new(),
+            proxy: Vec::new(),
             object: Vec::new(),
             surfels: DEFAULT_SURFELS,
             leaf: None,
@@ -160,6 +165,7 @@ impl SceneArgs {
             inputs: self.inputs.clone(),
             mirrors: self.mirror.clone(),
             objects: self.object.clone(),
+            proxies: self.proxy.clone(),
             eye: self.eye,
             target: self.target,
             fov_y_deg: self.fov,

@@ -58,7 +58,7 @@ pub(crate) struct RenderArgs {
 /// Method and backend.
 #[derive(Args, Debug)]
 pub(crate) struct HowArgs {
-    /// Reflection method: c3rc or raytrace
+    /// Reflection method: c3rc, raytrace, estalella, roger-holzschuch or environment
     #[arg(long, value_name = "ID", default_value = "c3rc")]
     pub(crate) method: String,
     /// Where it runs: auto (whatever is fastest here), cpu or gpu
@@ -286,6 +286,7 @@ impl Subject<'_> {
             "valid_share": report.valid_share(),
             "mirror_pixels": report.mirror_pixels,
             "covered_pixels": report.covered_pixels,
+            "notes": report.notes,
             "threads": rayon::current_num_threads(),
             "simd": simd_name(),
             "ms": {
@@ -336,6 +337,8 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
         let share = report.valid_share();
         let valid = share.map_or(String::new(), |share| format!(", {:.1} % valid", share * 100.0));
         say!("  {cameras} cameras, {batches} batches, {projections} projections{valid}");
+    } else if let (Some(searched), Some(reflected)) = (report.projections, report.valid) {
+        say!("  {searched} points searched for, {reflected} reflected");
     }
     let stages = [
         ("visibility", report.ids_ms),
@@ -350,4 +353,7 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
     ];
     let timed = stages.iter().filter_map(|(name, ms)| ms.map(|ms| format!("{name} {ms:.1}")));
     say!("  ms: {}", timed.collect::<Vec<_>>().join(", "));
+    for note in &report.notes {
+        say!("  note: {note}");
+    }
 }

@@ -1,8 +1,10 @@
 //! The registry of reflection methods: a method is one file (or folder) and one line in [`METHODS`].
 
 pub mod c3rc;
+pub mod environment_map;
 pub mod params;
 pub mod ray_traced;
+pub mod vertex_search;
 
 use std::any::Any;
 use std::sync::Arc;
@@ -101,6 +103,16 @@ pub trait Method: Send + Sync {
     /// Name, citation, parameters.
     fn info(&self) -> &'static MethodInfo;
 
+    /// The parameters that [`Method::prepare`] looks at.
+    fn prepares_with(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// A number that changes when what [`Method::prepare`] made does not hold any more: its meshes are others, by default.
+    fn version(&self, scene: &PreparedScene) -> u64 {
+        scene.version
+    }
+
     /// Whether the method can draw this scene.
     ///
     /// # Errors
@@ -131,7 +143,13 @@ pub trait Method: Send + Sync {
 }
 
 /// All methods; the first is the default.
-pub static METHODS: [&dyn Method; 2] = [&c3rc::C3rc, &ray_traced::RayTraced];
+pub static METHODS: [&dyn Method; 5] = [
+    &c3rc::C3rc,
+    &ray_traced::RayTraced,
+    &vertex_search::Estalella,
+    &vertex_search::RogerHolzschuch,
+    &environment_map::EnvironmentMap,
+];
 
 /// The method of that id.
 pub fn method(id: &str) -> Option<&'static dyn Method> {

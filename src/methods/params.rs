@@ -12,6 +12,8 @@ pub enum Value {
     Choice(&'static str),
     /// A whole number.
     Integer(u32),
+    /// A number.
+    Number(f32),
 }
 
 impl fmt::Display for Value {
@@ -20,6 +22,7 @@ impl fmt::Display for Value {
         match self {
             Self::Choice(word) => f.write_str(word),
             Self::Integer(n) => write!(f, "{n}"),
+            Self::Number(x) => write!(f, "{x}"),
         }
     }
 }
@@ -31,6 +34,8 @@ pub enum ParamKind {
     Choice(&'static [&'static str]),
     /// A whole number between these, inclusive.
     Integer(u32, u32),
+    /// A number between these, inclusive.
+    Number(f32, f32),
 }
 
 /// A parameter of a method.
@@ -60,6 +65,9 @@ impl ParamInfo {
             (ParamKind::Integer(min, max), Value::Integer(n)) => {
                 format!("{min} to {max}; default {n}")
             }
+            (ParamKind::Number(min, max), Value::Number(x)) => {
+                format!("{min} to {max}; default {x}")
+            }
             (_, default) => format!("{default:?}"),
         }
     }
@@ -69,6 +77,7 @@ impl ParamInfo {
         match self.kind {
             ParamKind::Choice(_) => "WORD",
             ParamKind::Integer(..) => "N",
+            ParamKind::Number(..) => "X",
         }
     }
 }
@@ -112,6 +121,17 @@ impl Params {
                     )
                 })?)
             }
+            ParamKind::Number(min, max) => {
+                let number = text.parse().ok().filter(|x| (min..=max).contains(x));
+                Value::Number(number.ok_or_else(|| {
+                    Error::input(
+                        flag,
+                        "",
+                        format!("\"{text}\" is not a number from {min} to {max}"),
+                        "give such a number",
+                    )
+                })?)
+            }
         };
         self.0.insert(info.id, value);
         Ok(())
@@ -130,6 +150,17 @@ impl Params {
         match self.0.get(id) {
             Some(Value::Choice(word)) => word,
             other => panic!("parameter {id} is {other:?}, not a choice"),
+        }
+    }
+
+    /// The number of a parameter that takes any.
+    ///
+    /// # Panics
+    /// If the method has no such number.
+    pub fn number(&self, id: &str) -> f32 {
+        match self.0.get(id) {
+            Some(Value::Number(x)) => *x,
+            other => panic!("parameter {id} is {other:?}, not a number"),
         }
     }
 

@@ -22,6 +22,9 @@ pub struct Request {
     pub inputs: Vec<String>,
     /// Instead of the scene's mirrors: files, as placed, and built-in shapes, where the teapot stands.
     pub mirrors: Vec<String>,
+    /// What stands for the mirrors, in their order: files, in the mirror's own space, and built-in shapes, as large as
+    /// the mirror. Replaces the scene's.
+    pub proxies: Vec<String>,
     /// Instead of the scene's objects: files, as placed, and built-in shapes, beside the teapot.
     pub objects: Vec<String>,
     /// Instead of the scene's.
@@ -66,7 +69,7 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
         let Placed { mesh, source, transform, name } =
             placed("--mirror", input, spot, &mut library)?;
         let name = new_name(&scene, &name);
-        scene.mirrors.push(Mirror { name, mesh, source, transform, tint: Vec3::ONE });
+        scene.mirrors.push(Mirror { name, mesh, source, transform, tint: Vec3::ONE, proxy: None });
     }
     for input in &request.objects {
         let spot = (OBJECT_DIAGONAL, BESIDE);
@@ -74,6 +77,16 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
             placed("--object", input, spot, &mut library)?;
         let (name, paint) = (new_name(&scene, &name), plain_paint(&mesh));
         scene.objects.push(Object { name, mesh, source, transform, paint, density: 1.0 });
+    }
+    let count = scene.mirrors.len();
+    for (i, input) in request.proxies.iter().enumerate() {
+        let Some(mirror) = scene.mirrors.get_mut(i) else {
+            let problem = format!("there are more of them than mirrors ({count})");
+            return Err(Error::input("--proxy", "", problem, "give one a mirror at most"));
+        };
+        mirror.proxy = Some(library.proxy(input, &mirror.mesh, |problem, remedy| {
+            Error::input("--proxy", "", problem, format!("{remedy}; files end in .obj or .ply"))
+        })?);
     }
     override_eye(&mut scene.eye, request)?;
     Ok(scene)
@@ -142,7 +155,7 @@ fn bare(name: &str) -> Scene {
 fn teapot(library: &mut Library) -> Result<Mirror> {
     let spot = (MIRROR_DIAGONAL, DVec3::ZERO);
     let Placed { mesh, source, transform, name } = placed("--mirror", "teapot", spot, library)?;
-    Ok(Mirror { name, mesh, source, transform, tint: Vec3::ONE })
+    Ok(Mirror { name, mesh, source, transform, tint: Vec3::ONE, proxy: None })
 }
 
 /// What becomes a mirror or an object.

@@ -74,6 +74,19 @@ pub struct Mirror {
     pub transform: Similarity,
     /// Linear RGB factor of what is reflected.
     pub tint: Vec3,
+    /// A closed, star-shaped mesh in the same local space that stands for the mirror where a method needs such a one.
+    pub proxy: Option<Proxy>,
+}
+
+/// What stands for a mirror.
+#[derive(Clone, Debug)]
+pub struct Proxy {
+    /// Its own space.
+    pub mesh: Arc<Mesh>,
+    /// Where the mesh comes from; `None` if it was given in code.
+    pub source: Option<Source>,
+    /// Its own space to the mirror's local space.
+    pub transform: Similarity,
 }
 
 /// A diffuse mesh.

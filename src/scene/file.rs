@@ -42,7 +42,7 @@ use glam::{DQuat, DVec3, Vec3};
 use toml::Spanned;
 
 use super::description::{
-    Environment, EyeDescription, Light, Mirror, Object, Paint, PatternKind, Scene,
+    Environment, EyeDescription, Light, Mirror, Object, Paint, PatternKind, Proxy, Scene,
 };
 use super::fit::fit;
 use super::library::{Found, Library, stem, unique};
@@ -121,6 +121,7 @@ pub fn parse(text: &str, name: &str, folder: &Path, cx: &Context) -> Result<Scen
         mirrors.push(Mirror {
             name: next_name(),
             transform: source.transform(at, &Thing::from(table), &mesh)?,
+            proxy: source.proxy(at, table.proxy.as_deref(), &mesh, &mut library)?,
             mesh,
             source: Some(from),
             tint: table.tint.map_or(Vec3::ONE, |c| c.0),
@@ -309,6 +310,20 @@ impl Text<'_> {
             (Some(_), Some(_)) => Err(self.error(at, "has both shape and file", "remove one")),
             (None, None) => Err(self.error(at, "has neither shape nor file", "add one of them")),
         }
+    }
+
+    /// What stands for a mirror with this mesh.
+    fn proxy(
+        &self,
+        at: usize,
+        input: Option<&str>,
+        mirror: &Mesh,
+        library: &mut Library,
+    ) -> Result<Option<Proxy>> {
+        let Some(input) = input else { return Ok(None) };
+        let path = self.folder.join(input);
+        let input = if path.exists() { path.to_str().unwrap_or(input) } else { input };
+        library.proxy(input, mirror, |problem, remedy| self.error(at, problem, remedy)).map(Some)
     }
 
     fn transform(&self, at: usize, thing: &Thing, mesh: &Mesh) -> Result<Similarity> {

@@ -57,6 +57,7 @@ impl PreparedScene {
                 source: None,
                 transform: Similarity::IDENTITY,
                 tint: Vec3::ONE,
+                proxy: None,
             }],
             objects: vec![Object {
                 name: NAME.into(),

@@ -3,11 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::description::Source;
+use glam::{DQuat, DVec3};
+
+use super::description::{Proxy, Source};
+use super::fit::{fit, world_bounds};
 use super::{builtin, load};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::Mesh;
+use crate::geometry::{Mesh, Similarity};
 
 /// Makes meshes and remembers them.
 pub(super) struct Library<'a> {
@@ -44,6 +47,25 @@ impl<'a> Library<'a> {
                 unknown(problem, format!("the shapes are {}", builtin::SHAPES.join(", ")))
             })
         })
+    }
+
+    /// What stands for a mirror: a file in the mirror's own space, or a built-in shape, made as large as the mirror.
+    pub(super) fn proxy(
+        &mut self,
+        input: &str,
+        mirror: &Mesh,
+        unknown: impl FnOnce(String, String) -> Error,
+    ) -> Result<Proxy> {
+        let path = Path::new(input);
+        if !builtin::SHAPES.contains(&input) && (load::is_mesh(path) || path.exists()) {
+            let (mesh, source) = self.file(path)?;
+            return Ok(Proxy { mesh, source: Some(source), transform: Similarity::IDENTITY });
+        }
+        let (mesh, source) = self.shape(input, None, unknown)?;
+        let (min, max) = world_bounds(mirror, &Similarity::IDENTITY);
+        let base = DVec3::new(0.5 * (min.x + max.x), min.y, 0.5 * (min.z + max.z));
+        let transform = fit(&mesh, DQuat::IDENTITY, (max - min).length(), base);
+        Ok(Proxy { mesh, source: Some(source), transform })
     }
 
     fn get(&mut self, source: Source, make: impl FnOnce() -> Result<Mesh>) -> Result<Found> {

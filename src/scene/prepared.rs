@@ -1,6 +1,7 @@
 //! A scene made ready to be rendered: surfels in leaf order, trees, triangles. Everything a frame depends on
 //! besides the eye and its parameters.
 
+mod look_up;
 mod place;
 
 use std::ops::Range;
@@ -10,12 +11,12 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
-use super::description::{Environment, EyeDescription, Light, Mirror, Paint, Scene};
+use super::description::{Environment, EyeDescription, Light, Mirror, Paint, Proxy, Scene, Source};
 use super::sample;
 use super::sun_map::SunMap;
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
+use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
-use crate::camera::{Eye, MirrorTriangle};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::surfel::PADDING;
@@ -69,6 +70,10 @@ pub struct PreparedMirror {
     pub tint: Vec3,
     /// Index of its first triangle over all mirrors.
     pub first_triangle: u32,
+    /// As in the scene.
+    pub source: Option<Source>,
+    /// As in the scene.
+    pub proxy: Option<Proxy>,
 }
 
 /// A diffuse object.
@@ -180,6 +185,8 @@ pub struct PreparedScene {
     pub light: Light,
     /// What preparing took.
     pub times: PrepareTimes,
+    /// Another number for other meshes, over all scenes of the program: places and light may change under it.
+    pub version: u64,
     /// Another number for other surfels or other light on them, over all scenes of the program.
     pub surfel_version: u64,
     /// Another number for other places of objects or mirrors, likewise.
@@ -282,6 +289,7 @@ impl PreparedScene {
             environment: scene.environment,
             light: scene.light,
             times,
+            version: another_version(),
             surfel_version: 0,
             placement_version: 0,
         };
@@ -322,51 +330,6 @@ impl PreparedScene {
     /// Number of surfels over all objects, without representatives.
     pub fn surfel_count(&self) -> usize {
         self.clouds[..self.objects.len()].iter().map(|o| o.surfels.len()).sum()
-    }
-
-    /// Mirrors nearer to where a reflected ray starts than this, in scene units, do not hide what it sees: the facets
-    /// of a mirror stand in the way of the rays of its smooth surface.
-    pub fn mirror_clearance(&self) -> f32 {
-        const CLEARANCE: f32 = 5e-3;
-        CLEARANCE * self.mirror_triangles.bounds().diagonal()
-    }
-
-    /// Surfels from this one on are mirrors'.
-    pub fn first_mirror_surfel(&self) -> u32 {
-        self.clouds[..self.objects.len()].last().map_or(0, |cloud| cloud.representatives.end)
-    }
-
-    /// Number of mirror triangles over all mirrors.
-    pub fn mirror_triangle_count(&self) -> usize {
-        self.mirrors.iter().map(|m| m.mesh.triangles().len()).sum()
-    }
-
-    /// The mirror of a mirror triangle and the triangle's index in it.
-    pub fn mirror_of(&self, triangle: u32) -> (usize, usize) {
-        let mirror = self.mirrors.partition_point(|m| m.first_triangle <= triangle) - 1;
-        (mirror, (triangle - self.mirrors[mirror].first_triangle) as usize)
-    }
-
-    /// Corners and normals of a mirror triangle.
-    pub fn mirror_triangle(&self, triangle: u32) -> MirrorTriangle {
-        let (mirror, triangle) = self.mirror_of(triangle);
-        let mirror = &self.mirrors[mirror];
-        let corner = mirror.mesh.triangles()[triangle];
-        MirrorTriangle {
-            corners: corner.map(|i| mirror.positions[i as usize]),
-            normals: corner.map(|i| mirror.normals[i as usize]),
-        }
-    }
-
-    /// The object of one of [`PreparedScene::triangles`] and the triangle's index in it.
-    pub fn object_of_triangle(&self, triangle: u32) -> (usize, usize) {
-        let object = self.objects.partition_point(|o| o.first_triangle <= triangle) - 1;
-        (object, (triangle - self.objects[object].first_triangle) as usize)
-    }
-
-    /// The cloud of a surfel or representative.
-    pub fn cloud_of_surfel(&self, surfel: u32) -> usize {
-        self.clouds.partition_point(|o| o.representatives.end <= surfel)
     }
 }
 
@@ -421,6 +384,8 @@ fn unplaced_mirrors(scene: &Scene) -> Vec<PreparedMirror> {
             normals: Vec::new(),
             tint: m.tint,
             first_triangle,
+            source: m.source.clone(),
+            proxy: m.proxy.clone(),
         };
         first_triangle += index(m.mesh.triangles().len());
         mirror

@@ -30,6 +30,7 @@ fn two_mirrors() -> PreparedScene {
         source: None,
         transform: moved(DVec3::new(-0.6, -0.1, 1.2)),
         tint: Vec3::ONE,
+        proxy: None,
     });
     prepared(&scene, 200_000)
 }

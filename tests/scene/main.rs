@@ -62,6 +62,7 @@ fn scene(mirror: (Arc<Mesh>, Similarity), objects: Vec<Object>, eye: EyeDescript
             source: None,
             transform,
             tint: Vec3::ONE,
+            proxy: None,
         }],
         objects,
         environment: Environment::Constant(Vec3::new(0.4, 0.5, 0.6)),

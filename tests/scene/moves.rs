@@ -152,6 +152,7 @@ fn two_mirrors(place: Similarity) -> Scene {
         source: None,
         transform: place,
         tint: Vec3::new(0.9, 0.8, 0.7),
+        proxy: None,
     });
     scene
 }

@@ -3,8 +3,10 @@
 pub mod direct;
 pub mod finish;
 mod look;
+pub(crate) mod lookup;
 pub(crate) mod planes;
 pub mod pool;
+pub(crate) mod search;
 pub mod splat;
 
 use std::time::Instant;
@@ -58,10 +60,10 @@ impl Backend for Cpu {
                         splat::splat(pass, &scene.surfels, visibility, &self.scratch);
                     self.landed = landed;
                     add(&mut report.passes_ms, milliseconds(start));
-                    report.cameras += pass.cameras.len();
+                    report.cameras = Some(pass.cameras.len());
                     report.patches += pass.patches.len();
-                    report.batches += done.batches;
-                    report.projections += done.projections;
+                    report.batches = Some(done.batches);
+                    report.projections = Some(done.projections);
                     report.valid = Some(report.valid.unwrap_or(0) + done.valid);
                     let per_thread = 1e-6 / rayon::current_num_threads() as f64;
                     add(&mut report.cull_ms, done.cull_ns as f64 * per_thread);
@@ -77,6 +79,19 @@ impl Backend for Cpu {
                 }
                 Pass::Gather(pass) => {
                     add(&mut report.rays_ms, pass.kernel.gather(out).rays_ms);
+                }
+                Pass::Lookup(pass) => {
+                    lookup::lookup(pass, scene, visibility, &lookup::by_cpu, out)?;
+                    add(&mut report.passes_ms, milliseconds(start));
+                }
+                Pass::Search(pass) => {
+                    let done = search::search(pass, scene, visibility, &search::by_cpu, out)?;
+                    add(&mut report.passes_ms, milliseconds(start));
+                    add(&mut report.project_ms, done.search_ms);
+                    add(&mut report.splat_ms, done.draw_ms);
+                    report.projections = Some(done.searched);
+                    report.valid = Some(done.reflected);
+                    report.notes.extend(done.notes);
                 }
             }
         }

@@ -256,7 +256,7 @@ impl Ready {
                 }
                 // Splats are resolved where they are drawn.
                 Pass::Resolve => {}
-                Pass::Gather(_) => {
+                Pass::Gather(_) | Pass::Lookup(_) | Pass::Search(_) => {
                     return Err(Error::input(
                         "--backend gpu",
                         "",

@@ -79,6 +79,12 @@ impl<const N: usize> CubeMap<N> {
         Place { first: (face * row + j as usize) * row + i as usize, between: [x - i, y - j] }
     }
 
+    /// The texel nearest to a direction of any length.
+    pub fn nearest(&self, direction: Vec3) -> usize {
+        let Place { first, between: [x, y] } = self.place(direction);
+        first + usize::from(x >= 0.5) + usize::from(y >= 0.5) * (self.side as usize + 2)
+    }
+
     /// The values in a direction of any length, between four texels.
     #[inline(always)]
     pub fn at(&self, direction: Vec3) -> [f32; N] {

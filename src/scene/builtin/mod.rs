@@ -62,6 +62,31 @@ pub fn shape(name: &str, triangles: Option<usize>) -> Option<Mesh> {
     Some((shape.make)(wanted))
 }
 
+/// The parts that a built-in shape with about so many triangles is made of: their names, and the triangles of each, in the
+/// shape's order. Most shapes are of one piece.
+pub fn parts(name: &str, triangles: Option<usize>) -> Vec<(&'static str, std::ops::Range<usize>)> {
+    let Some(shape) = TABLE.iter().find(|shape| shape.name == name) else { return Vec::new() };
+    let wanted = triangles.unwrap_or(shape.default).clamp(shape.least, MOST_TRIANGLES);
+    if name != "teapot" {
+        return vec![(shape.name, 0..usize::MAX)];
+    }
+    let mut first = 0;
+    let range = |(name, end): (&'static str, usize)| {
+        let range = first..end;
+        first = end;
+        (name, range)
+    };
+    teapot::parts(wanted).into_iter().map(range).collect()
+}
+
+/// The closed surface that an open built-in shape with about so many triangles is a part of, in the same space; `None` if
+/// there is none.
+pub fn closed(name: &str, triangles: Option<usize>) -> Option<Mesh> {
+    let bowl = TABLE.iter().find(|shape| shape.name == "bowl" && name == "bowl")?;
+    let wanted = triangles.unwrap_or(bowl.default).clamp(bowl.least, MOST_TRIANGLES);
+    Some(round::hollow(wanted))
+}
+
 /// The built-in scenes: names and texts.
 const SCENE_TEXTS: [(&str, &str); 3] = [
     ("default", include_str!("../../../assets/scenes/default.toml")),

@@ -77,13 +77,27 @@ pub(super) fn goblet(wanted: usize) -> Mesh {
 /// The inside of a bowl: a cap of a sphere of radius 1 out to 65° from its middle, tilted so that its opening
 /// faces +z and a little up, lowest point on y = 0. There is no outside.
 pub(super) fn bowl(wanted: usize) -> Mesh {
-    let rim = 65.0_f64.to_radians();
-    let cap = Piece::Arc(DVec2::Y, 1.0, [-FRAC_PI_2, rim - FRAC_PI_2]);
-    let tilt = DMat3::from_rotation_x(65.0_f64.to_radians());
-    let tilted = turn(&[&[cap]], 0.0, wanted)
-        .map(|v| Vertex { point: tilt * v.point, normal: tilt * v.normal });
+    let tilted = tilted_sphere(65.0, wanted);
     let lowest = tilted.lowest();
     tilted.map(|v| Vertex { point: v.point - DVec3::Y * lowest, ..v }).finish()
+}
+
+/// The whole sphere whose cap is the [`bowl`] of `wanted` triangles, seen from inside.
+pub(super) fn hollow(wanted: usize) -> Mesh {
+    let lowest = tilted_sphere(65.0, wanted).lowest();
+    tilted_sphere(180.0, HOLLOW_TRIANGLES)
+        .map(|v| Vertex { point: v.point - DVec3::Y * lowest, ..v })
+        .finish()
+}
+
+/// It is only read from.
+const HOLLOW_TRIANGLES: usize = 100_000;
+
+/// A cap out to an angle in degrees, seen from inside, tilted as the bowl is.
+fn tilted_sphere(rim_deg: f64, wanted: usize) -> Builder {
+    let cap = Piece::Arc(DVec2::Y, 1.0, [-FRAC_PI_2, rim_deg.to_radians() - FRAC_PI_2]);
+    let tilt = DMat3::from_rotation_x(65.0_f64.to_radians());
+    turn(&[&[cap]], 0.0, wanted).map(|v| Vertex { point: tilt * v.point, normal: tilt * v.normal })
 }
 
 fn turn(curves: &[&[Piece]], finest_radius: f64, wanted: usize) -> Builder {

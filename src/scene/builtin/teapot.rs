@@ -65,8 +65,7 @@ const SPOUT: [Half; 7] = [
 
 /// The teapot in Newell's units, y up, spout to -x; each patch is cut into the same number of quadrilaterals.
 pub(super) fn teapot(wanted: usize) -> Mesh {
-    // 28 patches; the four at the knob lose a triangle a column where they run together.
-    let cuts = best_grid(wanted, 9.0 / 8.0, [6, 5], |rows, columns| 4 * columns * (14 * rows - 1));
+    let cuts = cuts(wanted);
     let mut builder = Builder::default();
     for (part, pole) in [
         (BODY.map(ring).as_slice(), false),
@@ -77,6 +76,31 @@ pub(super) fn teapot(wanted: usize) -> Mesh {
         add_part(&mut builder, part, cuts, pole);
     }
     builder.finish()
+}
+
+/// How many quadrilaterals a patch is cut into, lengthwise and around: 28 patches; the four at the knob lose a triangle a
+/// column where they run together.
+fn cuts(wanted: usize) -> [usize; 2] {
+    best_grid(wanted, 9.0 / 8.0, [6, 5], |rows, columns| 4 * columns * (14 * rows - 1))
+}
+
+/// The teapot's parts, by how many of its triangles end with them: rim, body, lid, handle and spout.
+pub(super) fn parts(wanted: usize) -> Vec<(&'static str, usize)> {
+    let [rows, columns] = cuts(wanted);
+    // Rings of patches in each part, and how many patches go around.
+    let parts = [
+        ("rim", 1, 4, 0),
+        ("body", 2, 4, 0),
+        ("lid", 2, 4, 1),
+        ("handle", 2, 2, 0),
+        ("spout", 2, 2, 0),
+    ];
+    let mut end = 0;
+    let count = |(name, rings, around, poles): (&'static str, usize, usize, usize)| {
+        end += around * columns * (2 * rings * rows - poles);
+        (name, end)
+    };
+    parts.map(count).to_vec()
 }
 
 /// The control points of one closed curve about a part: three a patch, since patches share their ends.

@@ -70,6 +70,7 @@ pub(super) struct MirrorTable {
     pub file: Option<String>,
     pub triangles: Option<Triangles>,
     pub tint: Option<Color>,
+    pub proxy: Option<String>,
     pub rotate_deg: Option<RotationTable>,
     pub scale: Option<Positive>,
     pub translate: Option<Point>,

@@ -13,7 +13,9 @@ use super::{DEFAULT_FOV_Y_DEG, DEFAULT_SKY, Text, default_light, names, plain_pa
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, Similarity};
 use crate::image::io::write_bytes;
-use crate::scene::description::{Environment, Mirror, Object, Paint, PatternKind, Scene, Source};
+use crate::scene::description::{
+    Environment, Mirror, Object, Paint, PatternKind, Proxy, Scene, Source,
+};
 use crate::scene::load::linear_from_srgb;
 
 /// Writes a scene file, whole or not at all.
@@ -43,13 +45,14 @@ pub fn to_toml(scene: &Scene) -> Result<String> {
     }
     out.environment(&scene.environment);
     for mirror in &scene.mirrors {
-        let Mirror { name, mesh: _, source, transform, tint } = mirror;
+        let Mirror { name, mesh: _, source, transform, tint, proxy } = mirror;
         out.table("[[mirror]]");
         out.entry("name", name);
         out.source(name, source.as_ref())?;
         if *tint != Vec3::ONE {
             out.entry("tint", &Color::new(*tint));
         }
+        out.proxy(name, proxy.as_ref())?;
         out.transform(transform);
     }
     for object in &scene.objects {
@@ -148,6 +151,24 @@ impl Lines {
             }
         }
         Ok(())
+    }
+
+    fn proxy(&mut self, mirror: &str, proxy: Option<&Proxy>) -> Result<()> {
+        match proxy.map(|p| &p.source) {
+            None => Ok(()),
+            Some(Some(Source::Shape { name, .. })) => {
+                self.entry("proxy", name);
+                Ok(())
+            }
+            Some(Some(Source::File(path))) if path.to_str().is_some() => {
+                self.entry("proxy", &path.to_str());
+                Ok(())
+            }
+            Some(_) => {
+                let problem = "its proxy comes from no file and is no built-in shape";
+                Err(Error::input(mirror, "", problem, "leave the proxy out"))
+            }
+        }
     }
 
     fn paint(&mut self, paint: &Paint, mesh: &Mesh) {

@@ -127,6 +127,12 @@ fn parameter(ui: &mut egui::Ui, param: &ParamInfo, settings: &mut SideSettings) 
             ui.add(slider).labelled_by(label.id).on_hover_text(param.about);
             number.to_string()
         }
+        ParamKind::Number(min, max) => {
+            let mut number = side.params.number(param.id);
+            let slider = egui::Slider::new(&mut number, min..=max).smallest_positive(1e-3);
+            ui.add(slider.logarithmic(true)).labelled_by(label.id).on_hover_text(param.about);
+            number.to_string()
+        }
     };
     if side.params.get(param.id).is_some_and(|now| now.to_string() != chosen) {
         settings.params.insert(param.id.to_owned(), chosen);

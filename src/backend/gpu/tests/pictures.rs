@@ -46,6 +46,7 @@ pub(super) fn scene(shape: &str) -> PreparedScene {
         source: None,
         transform,
         tint: Vec3::ONE,
+        proxy: None,
     };
     let bowl = shape == "bowl";
     let scene = Scene {

@@ -1,0 +1,115 @@
+//! Executes search passes: points are searched for on reflectors, then drawn as triangles or squares.
+//!
+//! `images` says where points are seen, `pieces` cuts triangles that are seen in part, `triangles` and `points` draw.
+
+mod images;
+mod pieces;
+mod points;
+mod tessellate;
+#[cfg(test)]
+mod tests;
+mod triangles;
+mod zones;
+
+use std::time::Instant;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use self::images::Reflecting;
+use crate::camera::reflector::{Found, estalella, roger};
+use crate::error::Result;
+use crate::plan::Reflection;
+use crate::plan::search::{Primitive, ReflectorPart, Search, SearchPass};
+use crate::scene::prepared::{PreparedScene, milliseconds};
+use crate::visibility::Visibility;
+
+/// What a search pass did and took.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Done {
+    /// Points searched for, over all parts.
+    pub(crate) searched: u64,
+    /// Those that are reflected.
+    pub(crate) reflected: u64,
+    /// Wall time of the searches, milliseconds.
+    pub(crate) search_ms: f64,
+    /// Wall time of drawing and shading, milliseconds.
+    pub(crate) draw_ms: f64,
+    /// What could not be shown, a sentence each.
+    pub(crate) notes: Vec<String>,
+}
+
+/// One search on one reflector; everything relative to its centre, in its mirror's local space.
+pub(crate) struct Job<'a> {
+    /// What is searched on.
+    pub(crate) part: &'a ReflectorPart,
+    /// How.
+    pub(crate) search: Search,
+    /// The eye.
+    pub(crate) eye: Vec3,
+    /// A pixel as an angle, radians.
+    pub(crate) px: f32,
+    /// What is searched for.
+    pub(crate) points: &'a [Vec3],
+}
+
+/// Finds the reflection points of a job's points.
+pub(crate) type Finder<'a> = dyn Fn(&Job<'_>) -> Result<Vec<Found>> + 'a;
+
+/// On the CPU.
+#[expect(clippy::unnecessary_wraps, reason = "a finder may be a device that fails")]
+pub(crate) fn by_cpu(job: &Job<'_>) -> Result<Vec<Found>> {
+    /// Points a task: untuned.
+    const CHUNK: usize = 256;
+    let map = &job.part.map;
+    let find = |&point: &Vec3| match job.search {
+        Search::Estalella(ends) => {
+            let found = estalella::search(map, job.eye, point, false, ends);
+            if found.height(point) > 0.0 && found.height(job.eye) > 0.0 {
+                return found;
+            }
+            let hidden = estalella::search(map, job.eye, point, true, ends);
+            Found { steps: found.steps + hidden.steps, ..hidden }
+        }
+        Search::Roger { iterations, px } => {
+            let ends = roger::Ends { iterations, angle: px * job.px };
+            roger::search(map, job.eye, point, ends)
+        }
+    };
+    Ok(job.points.par_iter().with_min_len(CHUNK).map(find).collect())
+}
+
+/// Executes the pass.
+///
+/// # Errors
+/// The finder failed.
+pub(crate) fn search(
+    pass: &SearchPass<'_>,
+    scene: &PreparedScene,
+    visibility: &Visibility,
+    finder: &Finder<'_>,
+    out: &mut Reflection,
+) -> Result<Done> {
+    let pixels = visibility.size.pixels();
+    out.radiance.clear();
+    out.radiance.resize(pixels, Vec3::ZERO);
+    out.coverage.clear();
+    out.coverage.resize(pixels, 0.0);
+    let mut done = Done::default();
+    for part in &*pass.parts {
+        let start = Instant::now();
+        let searched = done.search_ms;
+        let reflecting = Reflecting::new(pass, part, scene, finder);
+        match pass.primitive {
+            Primitive::Triangles { longest_px } => {
+                let meshes = triangles::meshes(&reflecting, longest_px, &mut done)?;
+                triangles::draw(&reflecting, &meshes, visibility, out);
+            }
+            Primitive::Points(shape) => {
+                points::draw(&reflecting, shape, visibility, out, &mut done)?;
+            }
+        }
+        done.draw_ms += milliseconds(start) - (done.search_ms - searched);
+    }
+    Ok(done)
+}

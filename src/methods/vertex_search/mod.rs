@@ -1,0 +1,123 @@
+//! What the two vertex-search methods share: reflectors are found in mirrors and mapped once, then vertices or surfels are
+//! searched for on them.
+
+mod center;
+mod estalella;
+mod grid;
+mod maps;
+mod parts;
+mod roger_holzschuch;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+pub use estalella::Estalella;
+pub use roger_holzschuch::RogerHolzschuch;
+
+use super::{Made, ParamInfo, ParamKind, Params, Value};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::plan::SplatShape;
+use crate::plan::search::{Primitive, ReflectorPart};
+use crate::scene::prepared::PreparedScene;
+
+/// What the searches make once a scene.
+pub(super) struct Reflectors {
+    parts: Arc<Vec<ReflectorPart>>,
+    /// What cannot be searched on.
+    notes: Vec<String>,
+}
+
+const MAP_SIDE: ParamInfo = ParamInfo {
+    id: "map-side",
+    about: "texels a side of a reflector's cube maps",
+    unit: "",
+    kind: ParamKind::Integer(8, 1024),
+    default: Value::Integer(256),
+    is_quality_knob: true,
+};
+
+const MAP_TRIANGLES: ParamInfo = ParamInfo {
+    id: "map-triangles",
+    about: "triangles of the built-in shape that its maps are made from, which may be finer than the drawn one; 0: as drawn",
+    unit: "",
+    kind: ParamKind::Integer(0, 1 << 20),
+    default: Value::Integer(0),
+    is_quality_knob: false,
+};
+
+const PRIMITIVE: ParamInfo = ParamInfo {
+    id: "primitive",
+    about: "what is searched for: vertices of the meshes, between which triangles are drawn, or the surfels that c3rc projects",
+    unit: "",
+    kind: ParamKind::Choice(&["triangles", "points"]),
+    default: Value::Choice("triangles"),
+    is_quality_knob: false,
+};
+
+const POINT: ParamInfo = ParamInfo {
+    id: "point",
+    about: "pixels that a searched surfel covers: the one that it falls on, or 2 x 2",
+    unit: "",
+    kind: ParamKind::Choice(&["square1", "square2"]),
+    default: Value::Choice("square2"),
+    is_quality_knob: false,
+};
+
+const TESSELLATE: ParamInfo = ParamInfo {
+    id: "tessellate",
+    about: "edges whose images are longer than this are halved, eight times at most; 0: none are, as in the paper",
+    unit: "px",
+    kind: ParamKind::Number(0.0, 1000.0),
+    default: Value::Number(0.0),
+    is_quality_knob: true,
+};
+
+const PREPARES_WITH: [&str; 2] = [MAP_SIDE.id, MAP_TRIANGLES.id];
+
+fn primitive(params: &Params) -> Primitive {
+    if params.choice("primitive") == "points" {
+        let one = params.choice("point") == "square1";
+        return Primitive::Points(if one { SplatShape::Square1 } else { SplatShape::Square2 });
+    }
+    let px = params.number("tessellate");
+    Primitive::Triangles { longest_px: if px > 0.0 { px } else { f32::INFINITY } }
+}
+
+/// Whether some part of every mirror can be searched on.
+fn qualify(scene: &PreparedScene, params: &Params) -> Result<()> {
+    (0..scene.mirrors.len()).try_for_each(|mirror| {
+        parts::shapes(scene, mirror, params.integer("map-triangles")).map(|_| ())
+    })
+}
+
+/// Maps the reflectors of all mirrors.
+fn reflectors(scene: &PreparedScene, params: &Params, cx: &Context) -> Result<Made> {
+    let (mut list, mut notes) = (Vec::new(), Vec::new());
+    for mirror in 0..scene.mirrors.len() {
+        let (shapes, others) = parts::shapes(scene, mirror, params.integer("map-triangles"))?;
+        for shape in shapes {
+            cx.step("mapping reflectors", mirror as f64 / scene.mirrors.len() as f64)?;
+            list.push(maps::reflector(scene, mirror, &shape, params.integer("map-side")));
+        }
+        notes.extend(
+            others
+                .into_iter()
+                .map(|name| format!("{name} is not star-shaped: it shows the environment only")),
+        );
+    }
+    Ok(Arc::new(Reflectors { parts: Arc::new(list), notes }))
+}
+
+/// What [`reflectors`] made.
+fn made(made: &Made) -> &Reflectors {
+    made.downcast_ref().expect("prepare made it")
+}
+
+/// A mirror that no search works on.
+fn refused(scene: &PreparedScene, mirror: usize, problem: &str) -> Error {
+    let name = format!("mirror {}", scene.mirrors[mirror].name);
+    let remedy = "give a closed, star-shaped stand-in with --proxy, or use --method c3rc";
+    Error::input(name, "", problem, remedy)
+}
