@@ -23,7 +23,7 @@ static INFO: MethodInfo = MethodInfo {
     id: "environment",
     about: "environment mapping: a cube map from the mirror's centre, looked up by direction",
     citation: "Blinn & Newell 1976, Texture and Reflection in Computer Generated Images",
-    has_shaders: false,
+    has_shaders: true,
     params: &[
         ParamInfo {
             id: "cube-side",

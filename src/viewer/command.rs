@@ -16,7 +16,12 @@ pub(super) fn equivalent(viewer: &Viewer) -> (String, Option<&'static str>) {
         for input in &request.inputs {
             word(&mut line, input);
         }
-        for (flag, names) in [("--mirror", &request.mirrors), ("--object", &request.objects)] {
+        let lists = [
+            ("--mirror", &request.mirrors),
+            ("--object", &request.objects),
+            ("--proxy", &request.proxies),
+        ];
+        for (flag, names) in lists {
             for name in names {
                 line += " ";
                 line += flag;

@@ -1,5 +1,7 @@
 //! Executes lookup passes: what a mirror reflects, by the direction of the reflected ray.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -22,11 +24,12 @@ pub(crate) struct Asked {
 }
 
 /// Reads the cubes: radiance times coverage, and coverage.
-pub(crate) type Reader<'a> = dyn Fn(&[EnvironmentCube], &[Asked]) -> Result<Vec<[f32; 4]>> + 'a;
+pub(crate) type Reader<'a> =
+    dyn Fn(&Arc<Vec<EnvironmentCube>>, &[Asked]) -> Result<Vec<[f32; 4]>> + 'a;
 
 /// On the CPU.
 #[expect(clippy::unnecessary_wraps, reason = "a reader may be a device that fails")]
-pub(crate) fn by_cpu(cubes: &[EnvironmentCube], asked: &[Asked]) -> Result<Vec<[f32; 4]>> {
+pub(crate) fn by_cpu(cubes: &Arc<Vec<EnvironmentCube>>, asked: &[Asked]) -> Result<Vec<[f32; 4]>> {
     Ok(asked.par_iter().map(|a| cubes[a.mirror].radiance.at(a.direction)).collect())
 }
 

@@ -98,7 +98,7 @@ impl PictureBuffers {
                 ]),
                 false => None,
             },
-            reflection: gpu.buffer("the pixels", pixels * 16, own)?,
+            reflection: gpu.buffer("the pixels", pixels * 16, own | U::COPY_DST)?,
             nearest: gpu.buffer("the pixels", pixels * 8, own)?,
             colors_out: gpu.buffer("the pixels", pixels * 16, out)?,
             nearest_out: gpu.buffer("the pixels", pixels * 8, out)?,

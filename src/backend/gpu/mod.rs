@@ -11,12 +11,15 @@ mod look;
 mod pipelines;
 mod records;
 mod scene;
+mod search;
 mod shaders;
 mod surfaces;
 #[cfg(test)]
 mod tests;
 mod timing;
 
+use std::cell::RefCell;
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{Vec3, Vec4};
@@ -29,15 +32,18 @@ use self::look::Composer;
 use self::pipelines::{Groups, Pipelines};
 use self::records::Records;
 use self::scene::SceneBuffers;
+use self::search::Searcher;
 use self::timing::Timing;
 use super::cpu::finish::finish;
+use super::cpu::lookup::{Asked, lookup};
 use super::cpu::planes::{mark_mirrors, splat_planes};
+use super::cpu::search::{Job, search};
 use super::cpu::splat::{EMPTY, Landed};
 use super::{Backend, ExecuteReport};
 use crate::camera::Eye;
 use crate::error::{Error, Result};
 use crate::image::{Picture, Planes};
-use crate::plan::{Pass, Plan, Reflection, SplatPass, SplatShape};
+use crate::plan::{EnvironmentCube, Pass, Plan, Reflection, SplatPass, SplatShape};
 use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::Visibility;
 /// What [`Gpu::on_device`] takes.
@@ -86,6 +92,9 @@ struct Ready {
     groups: Option<(usize, usize, Groups)>,
     timing: Option<Timing>,
     composer: Option<Composer>,
+    searcher: Option<Searcher>,
+    /// The reflection of the last plan is on the device.
+    is_here: bool,
     /// The device cannot compose this scene: its placement.
     composed_elsewhere: Option<u64>,
     records: Records,
@@ -165,6 +174,8 @@ impl Ready {
             picture: None,
             groups: None,
             composer: None,
+            searcher: None,
+            is_here: false,
             composed_elsewhere: None,
             records: Records::default(),
             capacity: FIRST_CAPACITY,
@@ -231,6 +242,14 @@ impl Backend for Gpu {
     }
 }
 
+/// What searches on the device, made when it is first needed.
+fn searcher<'a>(own: &'a mut Option<Searcher>, gpu: &Device) -> Result<&'a mut Searcher> {
+    Ok(match own {
+        Some(searcher) => searcher,
+        none => none.insert(Searcher::new(gpu)?),
+    })
+}
+
 impl Ready {
     fn execute(
         &mut self,
@@ -256,7 +275,31 @@ impl Ready {
                 }
                 // Splats are resolved where they are drawn.
                 Pass::Resolve => {}
-                Pass::Gather(_) | Pass::Lookup(_) | Pass::Search(_) => {
+                Pass::Search(pass) => {
+                    let start = Instant::now();
+                    let searcher = RefCell::new(searcher(&mut self.searcher, &self.gpu)?);
+                    searcher.borrow_mut().hold_maps(&self.gpu, &pass.parts)?;
+                    let find = |job: &Job<'_>| searcher.borrow_mut().find(&self.gpu, job);
+                    let done = search(pass, scene, visibility, &find, out)?;
+                    report.passes_ms = Some(milliseconds(start));
+                    report.project_ms = Some(done.search_ms);
+                    report.splat_ms = Some(done.draw_ms);
+                    report.projections = Some(done.searched);
+                    report.valid = Some(done.reflected);
+                    report.notes.extend(done.notes);
+                    self.is_here = false;
+                }
+                Pass::Lookup(pass) => {
+                    let start = Instant::now();
+                    let searcher = RefCell::new(searcher(&mut self.searcher, &self.gpu)?);
+                    let read = |cubes: &Arc<Vec<EnvironmentCube>>, asked: &[Asked]| {
+                        searcher.borrow_mut().look_up(&self.gpu, cubes, asked)
+                    };
+                    lookup(pass, scene, visibility, &read, out)?;
+                    report.passes_ms = Some(milliseconds(start));
+                    self.is_here = false;
+                }
+                Pass::Gather(_) => {
                     return Err(Error::input(
                         "--backend gpu",
                         "",
@@ -323,6 +366,7 @@ impl Ready {
             self.capacity = needed.saturating_add(needed / 4).min(most);
         }
         self.read(visibility, out)?;
+        self.is_here = true;
         if let Some(timing) = &self.timing {
             let [project, resolve] = timing.milliseconds(&self.gpu)?;
             (report.project_ms, report.splat_ms) = (Some(project), Some(resolve));
@@ -421,8 +465,11 @@ impl Ready {
         white: f32,
         picture: &mut Picture,
     ) -> Result<()> {
-        let gpu = &self.gpu;
         let refused = || Error::input("--backend gpu", "", "this scene is too large", "");
+        if !self.is_here {
+            self.upload(visibility, reflection)?;
+        }
+        let gpu = &self.gpu;
         let own = self.picture.as_ref().filter(|p| p.size() == visibility.size);
         let own = own.ok_or_else(refused)?;
         if self.composed_elsewhere == Some(scene.placement_version) {
@@ -441,6 +488,21 @@ impl Ready {
             planes.radiance = reflection.radiance.iter().map(|c| c.to_array()).collect();
         }
         done
+    }
+
+    /// A reflection that was made elsewhere, to the device.
+    fn upload(&mut self, visibility: &Visibility, reflection: &Reflection) -> Result<()> {
+        let size = visibility.size;
+        if self.picture.as_ref().is_none_or(|p| p.size() != size) {
+            self.picture = None;
+            self.picture = Some(PictureBuffers::new(&self.gpu, size, self.capacity, false)?);
+        }
+        let color = |(c, &covered): (&Vec3, &f32)| c.extend(covered).to_array();
+        let colors: Vec<[f32; 4]> =
+            reflection.radiance.iter().zip(&reflection.coverage).map(color).collect();
+        let picture = self.picture.as_ref().expect("it was made");
+        self.gpu.queue.write_buffer(&picture.reflection, 0, bytemuck::cast_slice(&colors));
+        Ok(())
     }
 
     /// The reflection back to the CPU.

@@ -191,10 +191,10 @@ impl Records {
 
         let threads = rayon::current_num_threads() as f64;
         Some(ExecuteReport {
-            cameras: pass.cameras.len(),
+            cameras: Some(pass.cameras.len()),
             patches: pass.patches.len(),
-            batches: u64::from(batches),
-            projections: parts.iter().map(|p| p.surfels).sum(),
+            batches: Some(u64::from(batches)),
+            projections: Some(parts.iter().map(|p| p.surfels).sum()),
             cull_ms: Some(parts.iter().map(|p| p.nanoseconds).sum::<u64>() as f64 * 1e-6 / threads),
             ..ExecuteReport::default()
         })

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::records::{LAYOUT, NO_OWNER};
 use super::surfaces::{PAINTS, SURFACE_ROWS};
 use crate::backend::cpu::splat::{EDGE_TOLERANCE, blend, projection};
+use crate::camera::reflector::{estalella, roger};
 use crate::camera::three_ray::solve::MAX_STEPS;
 use crate::geometry::lanes::Scalar;
 use crate::plan::{CELL_SLACK_PX, LARGEST_ELLIPSE, SplatShape};
@@ -37,6 +38,10 @@ const COMPUTE_KEYS: &str = file!("passes/compute_keys.wgsl");
 const RESOLVE_LISTS: &str = file!("passes/resolve_lists.wgsl");
 const RESOLVE_KEYS: &str = file!("passes/resolve_keys.wgsl");
 const CLOSE: &str = file!("passes/close.wgsl");
+const SEARCH: &str = file!("passes/search.wgsl");
+const CUBE: &str = file!("camera/reflector/cube.wgsl");
+const ESTALELLA: &str = file!("camera/reflector/estalella.wgsl");
+const ROGER: &str = file!("camera/reflector/roger.wgsl");
 const LOOK: &str = file!("look.wgsl");
 const SHADOW: &str = file!("shadow.wgsl");
 const DIRECT: &str = file!("passes/direct.wgsl");
@@ -119,6 +124,33 @@ pub(super) fn resolve(shape: SplatShape, wide: bool) -> String {
 /// Closing gaps.
 pub(super) fn close() -> String {
     [&constants(SplatShape::Ellipse), PLAN, CLOSE].concat()
+}
+
+/// Searches on reflectors, and cube maps read.
+pub(super) fn search() -> String {
+    let mut text = format!("const GROUPS: u32 = {GROUPS}u;\n");
+    let numbers = [
+        ("MOST_STEP", estalella::MOST_STEP),
+        ("STEP_SHARE_LEAST", estalella::STEP_SHARE[0]),
+        ("STEP_SHARE_MOST", estalella::STEP_SHARE[1]),
+        ("STEP_RANGE_LEAST", estalella::STEP_RANGE[0]),
+        ("STEP_RANGE_MOST", estalella::STEP_RANGE[1]),
+        ("TURN", estalella::TURN),
+        ("TRUST_MOST", roger::TRUST[0]),
+        ("TRUST_FIRST", roger::TRUST[1]),
+        ("LEAST_DETERMINANT", roger::LEAST_DETERMINANT),
+        ("LEAST_AREA", roger::LEAST_AREA),
+        ("NEW_SIDE_LEAST", roger::NEW_SIDE[0]),
+        ("NEW_SIDE_MOST", roger::NEW_SIDE[1]),
+        ("GRADIENT_ENDS", roger::GRADIENT_ENDS),
+        ("LENGTH_NOISE", roger::LENGTH_NOISE),
+        ("LEAST_SIDE", roger::LEAST_SIDE),
+        ("HEIGHT", roger::HEIGHT),
+    ];
+    for (name, value) in numbers {
+        writeln!(text, "const {name}: f32 = {value:?}f;").expect("strings grow");
+    }
+    [&text, SEARCH, CUBE, ESTALELLA, ROGER].concat()
 }
 
 /// The direct view, the environment and the composition, with their entry points.

@@ -4,6 +4,7 @@ mod footprints;
 mod looks;
 mod mutants;
 mod pictures;
+mod searches;
 mod twins;
 
 use std::io::Write as _;

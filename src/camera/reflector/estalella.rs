@@ -16,11 +16,13 @@ pub struct Ends {
 
 /// No step is longer than this share of the radius: in the region around a silhouette the bisector says nothing about
 /// the distance. Measured: without it one point in a hundred is lost on a sphere.
-const MOST_STEP: f32 = 0.5;
+pub(crate) const MOST_STEP: f32 = 0.5;
 /// A full step is between these multiples of the half step that measured it.
-const STEP_SHARE: [f32; 2] = [0.5, 4.0];
+pub(crate) const STEP_SHARE: [f32; 2] = [0.5, 4.0];
+/// A full step follows the bisector in the middle if that has not turned by more than this (a cosine).
+pub(crate) const TURN: f32 = 0.3;
 /// Step sizes in units of radius and bisector.
-const STEP_RANGE: [f32; 2] = [0.05, 2.0];
+pub(crate) const STEP_RANGE: [f32; 2] = [0.05, 2.0];
 
 /// The bisector at a point, less its normal: what the search follows.
 #[derive(Clone, Copy)]
@@ -87,7 +89,7 @@ pub fn search(map: &ReflectorMap, eye: Vec3, vertex: Vec3, hidden: bool, ends: E
         size = if measured { 1.0 / (shrunk.abs() * radius) } else { 2.0 * size };
         size = size.clamp(STEP_RANGE[0], STEP_RANGE[1]);
         let turned = middle.toward.normalize_or(ahead);
-        let along = if turned.dot(ahead) > 0.3 { turned } else { ahead };
+        let along = if turned.dot(ahead) > TURN { turned } else { ahead };
         let full = if back { -full } else { full };
         at = bisector(map, eye, vertex, hidden, at.point + along * full);
         if at.error < best.error {

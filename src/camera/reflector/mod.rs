@@ -10,7 +10,7 @@ pub mod estalella;
 pub(crate) mod exact;
 pub mod roger;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use glam::Vec3;
 

@@ -24,21 +24,27 @@ struct Sample {
     slope: Vec3,
     /// Of the path's length over the unit sphere.
     gradient: Vec3,
-    /// The lower, the nearer to the reflection point.
-    merit: f32,
+    /// Length of the path.
+    length: f32,
 }
 
 /// Longest step over the unit sphere, and where it starts.
-const TRUST: [f32; 2] = [0.7, 0.5];
+pub(crate) const TRUST: [f32; 2] = [0.7, 0.5];
 /// Below this share of the largest value that it can have, the determinant δ says nothing; likewise the triangle's area.
-const LEAST_DETERMINANT: f32 = 1e-5;
-const LEAST_AREA: f32 = 1e-4;
+pub(crate) const LEAST_DETERMINANT: f32 = 1e-5;
+pub(crate) const LEAST_AREA: f32 = 1e-4;
 /// Sides of a triangle that is made anew.
-const NEW_SIDE: [f32; 2] = [1e-3, 0.3];
+pub(crate) const NEW_SIDE: [f32; 2] = [1e-3, 0.3];
 /// A search has not ended while the gradient is larger than this multiple of the angle that it is to end at.
-const GRADIENT_ENDS: f32 = 20.0;
-/// Path lengths that differ by less than this share are the same to f32.
-const MERIT_ROUNDING: f32 = 1e-6;
+pub(crate) const GRADIENT_ENDS: f32 = 20.0;
+/// Path lengths that differ by less than this share of the radius say nothing: the radius has the facets of the mesh that
+/// it was made from (edges of a tenth of it), the gradient is smooth.
+pub(crate) const LENGTH_NOISE: f32 = 3e-3;
+
+/// A first triangle with a shorter side would say nothing.
+pub(crate) const LEAST_SIDE: f32 = 0.05;
+/// Height of an equilateral triangle of side 1.
+pub(crate) const HEIGHT: f32 = 0.866;
 
 /// What all samples of a search share.
 struct Path<'a> {
@@ -64,21 +70,30 @@ impl Path<'_> {
         let along = e.dot(u);
         let slope = Vec3::new(x, y, z);
         let gradient = slope * along + (e - u * along) * r;
-        let merit = if self.shortest { eye_length + vertex_length } else { gradient.length() };
-        Sample { direction: u, point, slope, gradient, merit }
+        Sample { direction: u, point, slope, gradient, length: eye_length + vertex_length }
     }
-}
 
-/// Indices of the samples, the nearest first.
-fn order(samples: &[Sample; 3]) -> [usize; 3] {
-    let mut list = [0, 1, 2];
-    let nearer = |i: usize, j: usize| samples[i].merit < samples[j].merit;
-    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-        if nearer(list[j], list[i]) {
-            list.swap(i, j);
+    /// Whether `a` is nearer to the reflection point than `b`: by its path where that is clearly shorter, else by its
+    /// gradient.
+    #[inline(always)]
+    fn nearer(&self, a: &Sample, b: &Sample) -> bool {
+        let shorter = b.length - a.length;
+        if self.shortest && shorter.abs() > LENGTH_NOISE * a.point.length() {
+            return shorter > 0.0;
         }
+        a.gradient.length_squared() < b.gradient.length_squared()
     }
-    list
+
+    /// Indices of the samples, the nearest first.
+    fn order(&self, samples: &[Sample; 3]) -> [usize; 3] {
+        let mut list = [0, 1, 2];
+        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+            if self.nearer(&samples[list[j]], &samples[list[i]]) {
+                list.swap(i, j);
+            }
+        }
+        list
+    }
 }
 
 /// The point at which `vertex` is seen from `eye`.
@@ -95,7 +110,7 @@ pub fn search(map: &ReflectorMap, eye: Vec3, vertex: Vec3, ends: Ends) -> Found 
     let mut discarded: Option<Sample> = None;
     let mut trust = TRUST[1];
     for steps in 1..=ends.iterations {
-        let [best, middle, worst] = order(&samples);
+        let [best, middle, worst] = path.order(&samples);
         let nearest = samples[best];
         let old = if worst == newest { middle } else { worst };
         let Some(secant) = secant(&samples, [best, middle, worst]) else {
@@ -114,10 +129,10 @@ pub fn search(map: &ReflectorMap, eye: Vec3, vertex: Vec3, ends: Ends) -> Found 
         let new = path.sample(nearest.direction + step);
         let distance = (nearest.point - eye).length().max(f32::MIN_POSITIVE);
         let moved = length * nearest.point.length() / distance;
-        trust = if new.merit > nearest.merit * (1.0 + MERIT_ROUNDING) {
-            (0.5 * length).max(NEW_SIDE[0])
-        } else {
+        trust = if path.nearer(&new, &nearest) {
             (1.5 * trust).min(TRUST[0])
+        } else {
+            (0.5 * length).max(NEW_SIDE[0])
         };
         discarded = Some(samples[worst]);
         samples[worst] = new;
@@ -126,21 +141,11 @@ pub fn search(map: &ReflectorMap, eye: Vec3, vertex: Vec3, ends: Ends) -> Found 
             return found(map, &new, steps);
         }
     }
-    // Paths that are equally short to f32 are told apart by their gradients.
-    let best = samples[order(&samples)[0]];
-    let equal = |s: &&Sample| s.merit <= best.merit * (1.0 + MERIT_ROUNDING);
-    let flattest = |s: &&Sample, t: &&Sample| {
-        s.gradient.length_squared().total_cmp(&t.gradient.length_squared())
-    };
-    found(map, samples.iter().filter(equal).min_by(flattest).unwrap_or(&best), ends.iterations)
+    found(map, &samples[path.order(&samples)[0]], ends.iterations)
 }
 
 /// Feet of vertex and eye, and the third corner of an equilateral triangle (section 3.3.4).
 fn first_samples(path: &Path<'_>) -> [Sample; 3] {
-    /// A triangle with a shorter side would say nothing.
-    const LEAST_SIDE: f32 = 0.05;
-    /// Height of an equilateral triangle of side 1.
-    const HEIGHT: f32 = 0.866;
     let foot = |to: Vec3| path.sample(path.map.foot_direction(path.eye, to.normalize_or(Vec3::Y)));
     let (a, b) = (foot(path.vertex), foot(path.eye));
     let across = a.direction.cross(b.direction);

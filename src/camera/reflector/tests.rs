@@ -7,14 +7,14 @@ use super::exact::Surface;
 use super::*;
 use crate::camera::three_ray::tests::Numbers;
 
-const SPHERE: Surface = Surface::Sphere { inside: false };
-const ELLIPSOID: Surface = Surface::Ellipsoid(DVec3::new(1.0, 0.6, 1.5));
+pub(crate) const SPHERE: Surface = Surface::Sphere { inside: false };
+pub(crate) const ELLIPSOID: Surface = Surface::Ellipsoid(DVec3::new(1.0, 0.6, 1.5));
 const BUMPY: Surface = Surface::Bumpy(0.02);
 
 /// Texels a side.
 const SIDE: u32 = 256;
 
-fn map(surface: Surface, inward: bool) -> ReflectorMap {
+pub(crate) fn map(surface: Surface, inward: bool) -> ReflectorMap {
     let texels: Vec<(f32, Vec3)> = directions(SIDE)
         .into_iter()
         .map(|u| {
@@ -29,19 +29,30 @@ fn map(surface: Surface, inward: bool) -> ReflectorMap {
 
 /// An eye, a vertex and where it is seen.
 #[derive(Clone, Copy)]
-struct Case {
-    eye: DVec3,
-    vertex: DVec3,
-    exact: DVec3,
+pub(crate) struct Case {
+    pub(crate) eye: DVec3,
+    pub(crate) vertex: DVec3,
+    pub(crate) exact: DVec3,
 }
 
 /// Random cases: eyes 2.5 to 6 radii away, vertices 0.1 to 3 radii along the reflected ray, which the surface does not
 /// cut.
-fn cases(surface: Surface, count: usize) -> Vec<Case> {
+pub(crate) fn cases(surface: Surface, count: usize) -> Vec<Case> {
+    cases_of(surface, count, |numbers| {
+        numbers.point().normalize_or(DVec3::Z) * numbers.between(2.5, 6.0)
+    })
+}
+
+/// With these eyes.
+pub(crate) fn cases_of(
+    surface: Surface,
+    count: usize,
+    mut eyes: impl FnMut(&mut Numbers) -> DVec3,
+) -> Vec<Case> {
     let mut numbers = Numbers(11);
     let mut list = Vec::with_capacity(count);
     while list.len() < count {
-        let eye = numbers.point().normalize_or(DVec3::Z) * numbers.between(2.5, 6.0);
+        let eye = eyes(&mut numbers);
         let u = numbers.point().normalize_or(DVec3::Z);
         let exact = u * surface.radius(u);
         let (normal, view) = (surface.normal(exact), exact - eye);
@@ -62,7 +73,7 @@ fn cases(surface: Surface, count: usize) -> Vec<Case> {
 }
 
 /// How far apart two points are in the picture of an eye that looks at the origin, pixels at a focal length of 1000.
-fn apart_px(eye: DVec3, a: DVec3, b: DVec3) -> f64 {
+pub(crate) fn apart_px(eye: DVec3, a: DVec3, b: DVec3) -> f64 {
     let forward = (-eye).normalize_or(DVec3::Z);
     let (right, up) = forward.any_orthonormal_pair();
     let px = |p: DVec3| {

@@ -20,6 +20,10 @@ const SAMPLE: usize = 2_000;
 /// Rounds in which triangles that were overlooked join the sample.
 const ROUNDS: usize = 6;
 
+/// What is seen nearer to edge-on from the centre than this (a cosine) has too few texels to be searched on. The knob of the
+/// teapot's lid, whose neck hides it from below, is.
+const LEAST_COSINE: f64 = 0.05;
+
 /// A triangle's plane and its farthest corner decide.
 struct Face {
     normal: DVec3,
@@ -42,7 +46,9 @@ pub(super) fn center(triangles: &[[Vec3; 3]]) -> Option<Center> {
     }
     let bounds = Aabb::of(triangles.iter().flatten().copied());
     let best = [false, true].map(|inward| sided(&faces, bounds, inward));
-    best.into_iter().max_by(|a, b| a.cosine.total_cmp(&b.cosine)).filter(|c| c.cosine > 0.0)
+    best.into_iter()
+        .max_by(|a, b| a.cosine.total_cmp(&b.cosine))
+        .filter(|c| c.cosine > LEAST_COSINE)
 }
 
 /// The best centre for one side.

@@ -24,7 +24,7 @@ static INFO: MethodInfo = MethodInfo {
     id: "estalella",
     about: "virtual meshes: vertices searched for along the bisector on reflector cube maps",
     citation: "Estalella, Martin, Drettakis, Tost, Devillers & Cazals 2005, Accurate Interactive Specular Reflections on Curved Objects",
-    has_shaders: false,
+    has_shaders: true,
     params: &[
         ParamInfo {
             id: "iterations",

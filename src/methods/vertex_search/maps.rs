@@ -33,7 +33,7 @@ pub(super) fn reflector(
 }
 
 /// The radius and the unit normal in every direction of a map.
-fn surface(shape: &Shape, center: Vec3, side: u32) -> Vec<(f32, Vec3)> {
+pub(super) fn surface(shape: &Shape, center: Vec3, side: u32) -> Vec<(f32, Vec3)> {
     let relative: Vec<[Vec3; 3]> =
         shape.corners.iter().map(|corners| corners.map(|c| c - center)).collect();
     let bvh = TriangleBvh::build(&relative);

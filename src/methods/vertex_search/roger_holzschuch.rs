@@ -25,7 +25,7 @@ static INFO: MethodInfo = MethodInfo {
     id: "roger-holzschuch",
     about: "reflected vertices: searched for by the gradient of the optical path on a star-shaped reflector",
     citation: "Roger & Holzschuch 2006, Accurate Specular Reflections in Real-Time",
-    has_shaders: false,
+    has_shaders: true,
     params: &[
         ParamInfo {
             id: "iterations",

@@ -9,16 +9,17 @@ use crate::methods::{METHODS, ParamInfo, ParamKind};
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
     let compare = viewer.settings.compare;
+    let refusals = viewer.prepared.as_ref().map_or(&[][..], |prepared| &prepared.refusals);
     let [left, right] = &mut viewer.settings.sides;
     if !compare {
-        side(ui, "one", left);
+        side(ui, "one", left, refusals);
         return;
     }
     ui.strong("Left");
-    side(ui, "left", left);
+    side(ui, "left", left, refusals);
     ui.separator();
     ui.strong("Right");
-    side(ui, "right", right);
+    side(ui, "right", right, refusals);
     ui.separator();
     if ui.button("Exchange the sides").clicked() {
         viewer.settings.sides.swap(0, 1);
@@ -38,7 +39,13 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
     }
 }
 
-fn side(ui: &mut egui::Ui, salt: &str, settings: &mut SideSettings) {
+/// `refusals`: methods that cannot draw the scene, and why not.
+fn side(
+    ui: &mut egui::Ui,
+    salt: &str,
+    settings: &mut SideSettings,
+    refusals: &[(&'static str, String)],
+) {
     ui.push_id(salt, |ui| {
         egui::Grid::new("side").num_columns(2).show(ui, |ui| {
             let label = ui.label("method");
@@ -46,8 +53,16 @@ fn side(ui: &mut egui::Ui, salt: &str, settings: &mut SideSettings) {
                 .selected_text(settings.method().info().id)
                 .show_ui(ui, |ui| {
                     for info in METHODS.iter().map(|m| m.info()) {
-                        ui.selectable_value(&mut settings.method, info.id.to_owned(), info.id)
-                            .on_hover_text(format!("{}\n{}", info.about, info.citation));
+                        let refusal = refusals.iter().find(|(id, _)| *id == info.id);
+                        let chosen = settings.method == info.id;
+                        let entry = egui::Button::selectable(chosen, info.id);
+                        let shown = ui
+                            .add_enabled(refusal.is_none(), entry)
+                            .on_hover_text(format!("{}\n{}", info.about, info.citation))
+                            .on_disabled_hover_text(refusal.map_or("", |(_, why)| why));
+                        if shown.clicked() {
+                            info.id.clone_into(&mut settings.method);
+                        }
                     }
                 })
                 .response

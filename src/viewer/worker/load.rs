@@ -10,6 +10,7 @@ use super::{Arrived, Event, Prepared, Shared};
 use crate::context::{Context, Progress};
 use crate::error::{Error, Result};
 use crate::geometry::{Aabb, Similarity};
+use crate::methods::{METHODS, Method, Params};
 use crate::scene::arrange::{self, Request};
 use crate::scene::builtin;
 use crate::scene::description::{Scene, Source};
@@ -93,6 +94,7 @@ fn load(request: &LoadRequest, generation: u64, shared: &Shared, cx: &Context) -
             bounds: bounds(&ready),
             times: ready.times,
             load_ms,
+            refusals: refusals(&ready),
         };
         if !shared.is_newest(generation) {
             return Err(Error::Cancelled);
@@ -102,6 +104,15 @@ fn load(request: &LoadRequest, generation: u64, shared: &Shared, cx: &Context) -
         shared.post(|inbox| inbox.scene = Some(Box::new(arrived)));
     }
     Ok(())
+}
+
+/// Which methods cannot draw a scene with their defaults, and why not.
+fn refusals(scene: &PreparedScene) -> Vec<(&'static str, String)> {
+    let refusal = |m: &&dyn Method| {
+        let params = Params::defaults(m.info().params);
+        m.qualify(scene, &params).err().map(|error| (m.info().id, error.to_string()))
+    };
+    METHODS.iter().filter_map(refusal).collect()
 }
 
 fn mirrors(scene: &Scene) -> impl Iterator<Item = Similarity> {

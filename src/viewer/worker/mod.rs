@@ -124,6 +124,8 @@ pub struct Prepared {
     pub times: PrepareTimes,
     /// Reading files and making shapes, milliseconds.
     pub load_ms: f64,
+    /// Methods that cannot draw it, and why not.
+    pub refusals: Vec<(&'static str, String)>,
 }
 
 /// What comes back.

@@ -102,7 +102,7 @@ pub(crate) fn search(
         let reflecting = Reflecting::new(pass, part, scene, finder);
         match pass.primitive {
             Primitive::Triangles { longest_px } => {
-                let meshes = triangles::meshes(&reflecting, longest_px, &mut done)?;
+                let meshes = triangles::meshes(&reflecting, longest_px, visibility, &mut done)?;
                 triangles::draw(&reflecting, &meshes, visibility, out);
             }
             Primitive::Points(shape) => {

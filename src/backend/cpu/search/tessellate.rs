@@ -11,8 +11,33 @@ use crate::error::Result;
 
 /// An edge is halved so many times at most.
 const MOST_ROUNDS: usize = 8;
-/// A part of the mirror draws so many pieces at most.
-const MOST_PIECES: usize = 1 << 23;
+/// An object is divided into so many pieces at most, beside its own triangles.
+const MOST_PIECES: usize = 1 << 20;
+
+/// Which edges are halved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Goal {
+    /// Longer images, in pixels.
+    pub(super) longest_px: f32,
+    /// Where the part of the mirror is in the picture, pixels: edges that do not come near it do not matter.
+    pub(super) window: [Vec2; 2],
+}
+
+impl Goal {
+    /// Whether an edge with its ends there is halved.
+    fn asks(&self, ends: [Option<Vec2>; 2]) -> bool {
+        let [low, high] = self.window;
+        let inside = |p: Vec2| p.cmpge(low).all() && p.cmple(high).all();
+        match ends {
+            [Some(a), Some(b)] => {
+                let near = a.max(b).cmpge(low).all() && a.min(b).cmple(high).all();
+                near && a.distance(b) > self.longest_px
+            }
+            [Some(p), None] | [None, Some(p)] => inside(p),
+            [None, None] => false,
+        }
+    }
+}
 
 /// A corner by what it is the middle of, so that neighbours share it.
 type Key = [u32; 2];
@@ -25,7 +50,7 @@ struct Part {
     weights: [[f32; 3]; 3],
 }
 
-/// The triangles of an object, divided until the images of their edges are at most `longest_px` long. `first` is the
+/// The triangles of an object, divided until the images of their edges are short enough. `first` is the
 /// object's first triangle over all; `positions` are its vertices in scene space, with their images.
 ///
 /// Whether an edge is halved depends on its two ends only, so that neighbours agree about their common edge.
@@ -34,7 +59,7 @@ pub(super) fn tessellate(
     first: u32,
     triangles: &[[u32; 3]],
     (positions, images): (&[Vec3], Vec<Image>),
-    longest_px: f32,
+    goal: Goal,
     done: &mut Done,
 ) -> Result<Vec<Piece>> {
     let eye = reflecting.pass.eye;
@@ -48,8 +73,7 @@ pub(super) fn tessellate(
         let long = |a: u32, b: u32| {
             let (i, j) = (a as usize, b as usize);
             let seen = images[i].height > 0.0 || images[j].height > 0.0;
-            let far = px[i].zip(px[j]).is_none_or(|(p, q)| p.distance(q) > longest_px);
-            seen && far
+            seen && goal.asks([px[i], px[j]])
         };
         let mut middles: BTreeMap<Key, u32> = BTreeMap::new();
         let mut added = Vec::new();
@@ -67,7 +91,7 @@ pub(super) fn tessellate(
             };
             split(part, [middle(a, b), middle(b, c), middle(c, a)], &mut next);
         }
-        if added.is_empty() || next.len() > MOST_PIECES {
+        if added.is_empty() || next.len() > triangles.len() + MOST_PIECES {
             break;
         }
         let new = reflecting.images(&added, done)?;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::images::{Image, Reflecting};
 use super::pieces::{Piece, reflected_part, whole};
-use super::tessellate::tessellate;
+use super::tessellate::{Goal, tessellate};
 use super::{Done, zones};
 use crate::camera::Eye;
 use crate::error::Result;
@@ -31,12 +31,24 @@ pub(super) fn owns(part: &ReflectorPart, visibility: &Visibility, pixel: usize) 
     part.triangles.contains(&visibility.mirror_ids[pixel])
 }
 
+/// Where a part is in the picture, its corners in pixels; `None` if it is not.
+fn window(part: &ReflectorPart, visibility: &Visibility) -> Option<[Vec2; 2]> {
+    let width = visibility.size.width as usize;
+    let pixels = (0..visibility.mirror_ids.len()).filter(|&pixel| owns(part, visibility, pixel));
+    pixels
+        .map(|pixel| Vec2::new((pixel % width) as f32, (pixel / width) as f32))
+        .map(|corner| [corner, corner + 1.0])
+        .reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
+}
+
 /// The reflected meshes of all objects.
 pub(super) fn meshes(
     reflecting: &Reflecting<'_>,
     longest_px: f32,
+    visibility: &Visibility,
     done: &mut Done,
 ) -> Result<Vec<Mesh>> {
+    let window = longest_px.is_finite().then(|| window(reflecting.part, visibility)).flatten();
     done.notes.extend(zones::notes(reflecting)?);
     let objects = reflecting.scene.objects.iter().enumerate();
     let mut list = Vec::new();
@@ -47,9 +59,10 @@ pub(super) fn meshes(
         };
         let triangles = object.mesh.triangles();
         let (first, positions) = (object.first_triangle, &object.positions);
-        list.push(if longest_px.is_finite() {
+        list.push(if let Some(window) = window {
+            let goal = Goal { longest_px, window };
             let own = (&positions[..], images);
-            let pieces = tessellate(reflecting, first, triangles, own, longest_px, done)?;
+            let pieces = tessellate(reflecting, first, triangles, own, goal, done)?;
             let mut cut = Vec::with_capacity(pieces.len());
             pieces.iter().for_each(|piece| reflected_part(piece, &mut cut));
             Mesh { images: Vec::new(), pieces: cut, whole: false }

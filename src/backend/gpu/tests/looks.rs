@@ -68,6 +68,7 @@ fn scene(environment: Environment) -> PreparedScene {
         source: None,
         transform,
         tint,
+        proxy: None,
     };
     let scene = Scene {
         name: "test".into(),
