@@ -15,6 +15,7 @@
 //!         backend ─► Reflection                  per mirror pixel: radiance, coverage; on demand what was seen (Planes)
 //!         compose ─► Picture                     environment where nothing landed, tint, antialiased direct view
 //! then    Picture ─► PNG, EXR, HDR, window     Planes ─► EXR, comparison
+//! points  Scene ─► PathScene ─► PathFinder ─► PathSet        every image of a point, without a picture
 //! ```
 //!
 //! A frame depends on the prepared scene, the eye and the method's parameters, and on nothing else: it has
@@ -54,6 +55,7 @@
 //! | [`camera`] | the eye, mirror rays, continuous 3-ray cameras | geometry |
 //! | [`accel`] | kd-trees over surfels, triangle BVHs | geometry |
 //! | [`scene`] | files, built-in shapes, sampling, shading, [`scene::PreparedScene`] | geometry, camera, accel, image |
+//! | [`paths`] | every image of a point in the cameras of all mirrors, in f64 | geometry, camera, accel, scene |
 //! | [`visibility`] | what the eye sees directly, patches of mirrors | geometry, camera, scene |
 //! | [`plan`] | a frame as data: passes, cameras, batches | geometry, camera, scene, visibility, image |
 //! | [`cull`] | (trees, camera) → batches | geometry, camera, accel, scene, plan |
@@ -142,6 +144,7 @@ pub mod frame;
 pub mod geometry;
 pub mod image;
 pub mod methods;
+pub mod paths;
 pub mod plan;
 pub mod scene;
 #[cfg(feature = "viewer")]

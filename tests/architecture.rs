@@ -8,12 +8,13 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Rooms and what they may use besides themselves and [`ANYONE`].
-const ROOMS: [(&str, &[&str]); 13] = [
+const ROOMS: [(&str, &[&str]); 14] = [
     ("geometry", &[]),
     ("image", &[]),
     ("camera", &["geometry"]),
     ("accel", &["geometry"]),
     ("scene", &["geometry", "camera", "accel", "image"]),
+    ("paths", &["geometry", "camera", "accel", "scene"]),
     ("visibility", &["geometry", "camera", "scene"]),
     ("plan", &["geometry", "camera", "scene", "visibility", "image"]),
     ("cull", &["geometry", "camera", "accel", "scene", "plan"]),
@@ -42,6 +43,7 @@ const ROOMS: [(&str, &[&str]); 13] = [
             "camera",
             "accel",
             "scene",
+            "paths",
             "visibility",
             "plan",
             "cull",
@@ -58,6 +60,7 @@ const ROOMS: [(&str, &[&str]); 13] = [
             "camera",
             "accel",
             "scene",
+            "paths",
             "visibility",
             "plan",
             "cull",
