@@ -11,6 +11,7 @@ mod light;
 mod moves;
 mod plane_mirror;
 mod plans;
+mod roots;
 
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! The caustics of all cameras of an eye: where the mirrors focus its rays.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::MirrorCameras;
@@ -22,6 +22,8 @@ pub struct CausticStrip {
 pub struct CausticSurface {
     /// By mirror triangle, then by λ.
     pub strips: Vec<CausticStrip>,
+    /// World position of scene space's zero.
+    pub origin: DVec3,
 }
 
 impl MirrorCameras {
@@ -38,7 +40,8 @@ impl MirrorCameras {
                 lambdas: strip.iter().map(|r| r.lambda as f32).collect(),
             })
         };
-        CausticSurface { strips: self.cameras.par_iter().flat_map_iter(of).collect() }
+        let strips = self.cameras.par_iter().flat_map_iter(of).collect();
+        CausticSurface { strips, origin: self.origin }
     }
 }
 

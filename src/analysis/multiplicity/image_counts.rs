@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{FrontCamera, even};
+use super::{MirrorCameras, even};
 use crate::context::Context;
 use crate::error::Result;
 use crate::paths::PathFinder;
@@ -75,25 +75,24 @@ pub fn surfel_points(scene: &PreparedScene, most: usize) -> Vec<DVec3> {
     surfels.step_by(step).collect()
 }
 
-/// `count` points on rays of the cameras, up to the distance `extent` from the mirror, in the cameras' space: evenly over the
-/// mirrors' area and over the distance. None if no camera has an area.
-pub fn ray_points(cameras: &[FrontCamera], extent: f64, count: u32) -> Vec<DVec3> {
-    let area = |camera: &FrontCamera| {
-        let [a, b, c] = camera.rays.origins;
-        (b - a).cross(c - a).length()
-    };
-    let mut up_to = Vec::with_capacity(cameras.len());
+/// About `count` points on rays of the cameras, up to the distance of the scene's extent from the mirror: evenly over the
+/// mirrors' area that faces the eye and over the distance. World space; none if no camera has an area.
+pub fn ray_points(cameras: &MirrorCameras, count: u32) -> Vec<DVec3> {
+    let list = &cameras.cameras;
+    let mut up_to = Vec::with_capacity(list.len());
     let mut total = 0.0;
-    for camera in cameras {
-        total += area(camera);
+    for camera in list {
+        let [a, b, c] = camera.rays.origins;
+        total += (b - a).cross(c - a).length();
         up_to.push(total);
     }
     let point = |i: u32| {
         let (w, share) = even(i);
         let place = (f64::from(i) + 0.5) / f64::from(count) * total;
-        let camera = cameras.get(up_to.partition_point(|end| *end < place))?;
+        let camera = list.get(up_to.partition_point(|end| *end < place))?;
         let (v, d) = camera.rays.at(w);
-        camera.faces(w).then(|| v + d.try_normalize().unwrap_or(DVec3::ZERO) * (share * extent))
+        let far = d.normalize_or_zero() * (share * cameras.extent);
+        camera.faces(w).then(|| v + far + cameras.origin)
     };
     (0..count).filter_map(point).collect()
 }

@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use caustic_surface::{CausticStrip, CausticSurface};
-pub use image_counts::{ImageHistogram, image_histogram};
+pub use image_counts::{ImageHistogram, image_histogram, ray_points, surfel_points};
 pub use pictures::{COUNT_COLORS, class_color, class_picture, count_color, double_image_picture};
 pub use slice::{Slice, camera_slice, mirror_slice};
 
@@ -42,6 +42,8 @@ pub struct MirrorCameras {
     pub triangles: usize,
     /// Diagonal of the box about all mirrors and objects, scene units.
     pub extent: f64,
+    /// World position of scene space's zero.
+    pub origin: DVec3,
 }
 
 /// Sampled points of one camera, or of several, by their number of images in it.
@@ -52,6 +54,12 @@ pub struct SampledImages {
 }
 
 impl SampledImages {
+    /// Of both together.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self { points: [0, 1, 2].map(|i| self.points[i] + other.points[i]) }
+    }
+
     /// Share of the points that have several images; 0 if there are no points.
     pub fn several_share(&self) -> f64 {
         let [one, two, three] = self.points.map(f64::from);
@@ -79,7 +87,7 @@ impl MirrorCameras {
         };
         let count = u32::try_from(triangles).expect("indices of triangles are 32 bits");
         let cameras = (0..count).into_par_iter().filter_map(of).collect();
-        Self { cameras, triangles, extent }
+        Self { cameras, triangles, extent, origin: scene.origin }
     }
 
     /// How the rays of each triangle's camera run up to its reach; `None` for triangles that turn away from the eye.
@@ -111,6 +119,12 @@ impl FrontCamera {
     pub fn class(&self) -> Class {
         let classes = self.parts().map(|part| Jacobian::of(&part).class(0.0, self.reach));
         classes.max().unwrap_or(Class::Divergent)
+    }
+
+    /// The intervals of λ in which it is mixed, up to its reach; those of its parts one after the other.
+    pub fn mixed_intervals(&self) -> Vec<[f64; 2]> {
+        let of = |part: Rays| Jacobian::of(&part).mixed_intervals(0.0, self.reach);
+        self.parts().flat_map(|part| of(part).as_slice().to_vec()).collect()
     }
 
     /// How many images it has of a point of scene space, up to its reach.
@@ -152,7 +166,8 @@ impl FrontCamera {
 /// Roberts (2018), folded into the triangle.
 fn even(i: u32) -> (DVec3, f64) {
     /// Powers of the inverse of the root of x⁴ = x + 1.
-    const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3];
+    const STEPS: [f64; 3] =
+        [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3];
     let [mut b, mut c, share] = STEPS.map(|step| (0.5 + step * f64::from(i + 1)).fract());
     if b + c > 1.0 {
         (b, c) = (1.0 - b, 1.0 - c);
@@ -166,9 +181,7 @@ fn front_parts(facing: [f64; 3]) -> impl Iterator<Item = Option<[DVec3; 3]>> {
     let front = facing.map(|f| f >= 0.0);
     let corner = [DVec3::X, DVec3::Y, DVec3::Z];
     // Where the silhouette meets the edge ij.
-    let cut = |i: usize, j: usize| {
-        corner[i].lerp(corner[j], facing[i] / (facing[i] - facing[j]))
-    };
+    let cut = |i: usize, j: usize| corner[i].lerp(corner[j], facing[i] / (facing[i] - facing[j]));
     let parts = match front.iter().filter(|f| **f).count() {
         3 => [Some(None), None],
         0 => [None, None],

@@ -2,7 +2,6 @@
 
 use glam::{DVec3, Vec3};
 
-use super::MirrorCameras;
 use crate::camera::Eye;
 use crate::camera::RayScale;
 use crate::camera::mirror_ray::weights_on_line;
@@ -145,14 +144,4 @@ fn mirror_picture(
         };
     }
     picture
-}
-
-impl MirrorCameras {
-    /// The camera, by index, in which most sampled points have several images; `None` if all are seen once.
-    pub fn most_folded(&self, points: u32) -> Option<usize> {
-        let shares = self.sampled_images(points);
-        let several = |i: usize| shares[i].several_share();
-        let best = (0..shares.len()).max_by(|&a, &b| several(a).total_cmp(&several(b)).then(b.cmp(&a)))?;
-        (several(best) > 0.0).then_some(best)
-    }
 }

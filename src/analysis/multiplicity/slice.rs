@@ -81,7 +81,8 @@ pub fn camera_slice(camera: &FrontCamera, pixels: [u32; 2]) -> Option<Slice> {
     let across = (across - along * across.dot(along)).try_normalize()?;
     // As wide as the volume is at the mirror and at the end.
     let rays = &camera.rays;
-    let at = |i: usize, lambda: f64| (rays.origins[i] + rays.directions[i] * lambda - v).dot(across);
+    let at =
+        |i: usize, lambda: f64| (rays.origins[i] + rays.directions[i] * lambda - v).dot(across);
     let ends = (0..3).flat_map(|i| [at(i, 0.0), at(i, end)]);
     let (low, high) =
         ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
