@@ -14,8 +14,8 @@ use crate::paths::PathFinder;
 use crate::scene::PreparedScene;
 use crate::visibility::{NONE_ID, Visibility};
 
-/// What numbers of images look like, as 8-bit sRGB: 0 to 7, and the last for more.
-pub const COUNT_COLORS: [[u8; 3]; 9] = [
+/// What numbers of images look like, as 8-bit sRGB: 0 to 11, and the last for more.
+pub const COUNT_COLORS: [[u8; 3]; 13] = [
     [0x22, 0x26, 0x2e],
     [0x4a, 0x7f, 0xc1],
     [0xf2, 0xc1, 0x4e],
@@ -24,6 +24,10 @@ pub const COUNT_COLORS: [[u8; 3]; 9] = [
     [0x8d, 0x4f, 0xb3],
     [0xf4, 0xa6, 0xd7],
     [0x2b, 0xb3, 0xa3],
+    [0xc7, 0xa0, 0x7a],
+    [0x6b, 0x5b, 0x95],
+    [0xd9, 0xe2, 0x84],
+    [0x9c, 0x2f, 0x45],
     [0xf7, 0xf3, 0xe3],
 ];
 

@@ -5,8 +5,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{FrontCamera, MirrorCameras};
-use crate::camera::three_ray::ThreeRay;
 use crate::camera::three_ray::multiplicity::Jacobian;
+use crate::camera::three_ray::{Rays, ThreeRay};
 use crate::context::Context;
 use crate::error::Result;
 use crate::image::Picture;
@@ -60,58 +60,70 @@ impl Slice {
     }
 }
 
-/// How far beyond the last mixed interval a view volume is shown, in its λ.
-const BEYOND: f64 = 1.3;
+/// How far beyond its ends a mixed interval is shown, in its length.
+const BEYOND: f64 = 0.6;
 
-/// The images in one camera, over the plane in which its rays first cross: through the middle of the fold halfway along its
-/// widest mixed interval, with the ray there (to the right, from the mirror on) and the way along which neighbouring rays
-/// meet it. `None` if the camera is not mixed up to its reach.
+/// The images in one camera about its widest mixed interval, over the plane in which its rays cross: through the middle of
+/// the fold halfway, with the ray there (to the right, away from the mirror) and the way along which neighbouring rays meet
+/// it. `None` if the camera is not mixed up to its reach.
 pub fn camera_slice(camera: &FrontCamera, pixels: [u32; 2]) -> Option<Slice> {
-    let jacobian = Jacobian::of(&camera.rays);
-    let mixed = jacobian.mixed_intervals(0.0, camera.reach);
-    let width = |[from, to]: &[f64; 2]| to - from;
-    let widest = mixed.as_slice().iter().max_by(|a, b| width(a).total_cmp(&width(b)))?;
+    let width = |[from, to]: [f64; 2]| to - from;
+    // Of the part in front: elsewhere folds are not seen.
+    let intervals = camera.parts().flat_map(|part| {
+        let mixed = Jacobian::of(&part).mixed_intervals(0.0, camera.reach);
+        mixed.as_slice().iter().map(|interval| (part, *interval)).collect::<Vec<_>>()
+    });
+    let (rays, widest) = intervals.max_by(|a, b| width(a.1).total_cmp(&width(b.1)))?;
     let lambda = 0.5 * (widest[0] + widest[1]);
-    let [a, b] = jacobian.fold(lambda)?;
+    let [a, b] = Jacobian::of(&rays).fold(lambda)?;
     let w = (a + b) * 0.5;
-    let end = (widest[1] * BEYOND).min(camera.reach);
-    let (v, d) = camera.rays.at(w);
+    let beyond = BEYOND * (widest[1] - widest[0]);
+    let (start, end) = ((widest[0] - beyond).max(0.0), (widest[1] + beyond).min(camera.reach));
+    let (v, d) = rays.at(w);
     let along = d.try_normalize()?;
-    let across = crossing(camera, w, lambda)?;
+    let across = crossing(&rays, w, lambda)?;
     let across = (across - along * across.dot(along)).try_normalize()?;
-    // As wide as the volume is at the mirror and at the end.
-    let rays = &camera.rays;
-    let at =
-        |i: usize, lambda: f64| (rays.origins[i] + rays.directions[i] * lambda - v).dot(across);
-    let ends = (0..3).flat_map(|i| [at(i, 0.0), at(i, end)]);
-    let (low, high) =
-        ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-    let margin = 0.05 * (high - low);
-    let (low, high) = (low - margin, high + margin);
-    let sides = [d * end, across * (high - low)];
-    let mut slice = Slice::empty(v + across * low, sides, pixels);
-    let three_ray = ThreeRay::new(rays, rays);
+    let steps = (0..=STEPS).map(|k| start + (end - start) * f64::from(k) / f64::from(STEPS));
+    let widest = steps.flat_map(|lambda| {
+        let corners = [0, 1, 2].map(|i| rays.origins[i] + rays.directions[i] * lambda - v);
+        crossings(corners, along.cross(across)).map(|point| point.dot(across).abs())
+    });
+    let widest = widest.fold(0.0, f64::max);
+    let sides = [d * (end - start), across * (2.0 * widest)];
+    let mut slice = Slice::empty(v + d * start - across * widest, sides, pixels);
+    let three_ray = ThreeRay::new(&camera.rays, &camera.rays);
     let points: Vec<DVec3> = slice.points().collect();
     let count = |point: &DVec3| u32::try_from(camera.images(&three_ray, *point)).unwrap_or(0);
     slice.counts = points.par_iter().map(count).collect();
     Some(slice)
 }
 
+/// How often a view volume's width is measured.
+const STEPS: u32 = 32;
+
+/// Where a triangle's edges cross the plane through the origin with this normal.
+fn crossings(corners: [DVec3; 3], normal: DVec3) -> impl Iterator<Item = DVec3> {
+    [(0, 1), (1, 2), (2, 0)].into_iter().filter_map(move |(i, j)| {
+        let [a, b] = [corners[i], corners[j]].map(|p| p.dot(normal));
+        ((a < 0.0) != (b < 0.0)).then(|| corners[i].lerp(corners[j], a / (a - b)))
+    })
+}
+
 /// The way on the mirror along which rays meet the one at `w`, which touches the fold at λ: E(λ) turns it into d.
-fn crossing(camera: &FrontCamera, w: DVec3, lambda: f64) -> Option<DVec3> {
-    let ([v1, v2, v3], [d1, d2, d3]) = (camera.rays.origins, camera.rays.directions);
+fn crossing(rays: &Rays, w: DVec3, lambda: f64) -> Option<DVec3> {
+    let ([v1, v2, v3], [d1, d2, d3]) = (rays.origins, rays.directions);
     let (e1, e2) = (v2 - v1, v3 - v1);
     let (moved1, moved2) = (e1 + (d2 - d1) * lambda, e2 + (d3 - d1) * lambda);
     let n = moved1.cross(moved2);
-    let (_, d) = camera.rays.at(w);
+    let (_, d) = rays.at(w);
     let along = e1 * d.cross(moved2).dot(n) + e2 * moved1.cross(d).dot(n);
     along.try_normalize()
 }
 
 /// The side of a mirror's slice, in diagonals of the mirrors' box.
-const MIRROR_SIDE: f64 = 2.0;
+const MIRROR_SIDE: f64 = 1.5;
 /// Its middle lies so far from the box's along the rays' mean direction.
-const MIRROR_SHIFT: f64 = 0.6;
+const MIRROR_SHIFT: f64 = 0.45;
 
 /// The images over all cameras, on the plane through the middle of the mirrors and the eye that holds the eye's upward
 /// direction; a square that extends to where the rays go.

@@ -116,7 +116,14 @@ impl Jacobian {
     /// The first end lies on the edge along which, counter-clockwise, g falls below 0, the second on that where it rises;
     /// so each end moves steadily with λ while the signs are mixed. On the edge ij it is at w_i = g_j / (g_j - g_i).
     pub fn fold(&self, lambda: f64) -> Option<[DVec3; 2]> {
-        Some(self.fold_edges(lambda)?.map(|edge| self.fold_on(edge, lambda)))
+        let g = self.at(lambda);
+        let end = |edge: [usize; 2]| {
+            let mut w = DVec3::ZERO;
+            w[edge[0]] = share_of_first(g, edge);
+            w[edge[1]] = 1.0 - w[edge[0]];
+            w
+        };
+        Some(self.fold_edges(lambda)?.map(end))
     }
 
     /// The edges that the fold's ends lie on, as for [`Jacobian::fold`].
@@ -127,16 +134,6 @@ impl Jacobian {
             edges.into_iter().find(|&[i, j]| below.test(i) == from && below.test(j) == to)
         };
         Some([is(false, true)?, is(true, false)?])
-    }
-
-    /// Where the fold meets an edge; the end of the edge that is nearer if rounding puts it beyond.
-    pub(super) fn fold_on(&self, [i, j]: [usize; 2], lambda: f64) -> DVec3 {
-        let g = self.at(lambda);
-        let share = g[j] / (g[j] - g[i]);
-        let mut w = DVec3::ZERO;
-        w[i] = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 };
-        w[j] = 1.0 - w[i];
-        w
     }
 
     /// The λ at which the ray `w` meets the fold: the roots of Σ w_i g_i, as far as they are real and finite.
@@ -161,6 +158,13 @@ impl Jacobian {
             Class::Divergent
         }
     }
+}
+
+/// The weight of the edge ij's first end where the fold meets it, g being (g_1, g_2, g_3) there; that of an end of the edge if
+/// rounding puts it beyond.
+pub(super) fn share_of_first(g: DVec3, [i, j]: [usize; 2]) -> f64 {
+    let share = g[j] / (g[j] - g[i]);
+    if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 }
 }
 
 fn is_mixed(g: DVec3) -> bool {

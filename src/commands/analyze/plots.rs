@@ -109,7 +109,7 @@ pub(super) fn slice(cut: &CameraSlice) -> anyhow::Result<String> {
         chart
             .configure_mesh()
             .disable_mesh()
-            .x_desc("along the ray from the mirror")
+            .x_desc("along the ray, away from the mirror")
             .y_desc("across")
             .y_label_formatter(&|y| format!("{y:.1e}"))
             .label_style(FONT)

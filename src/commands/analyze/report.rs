@@ -159,7 +159,7 @@ pub(super) fn markdown(findings: &Findings) -> String {
                 cut.mixed.iter().map(|[from, to]| format!("{from:.4} to {to:.4}")).collect();
             format!(
                 "![slice](slice.png)\n\nThe camera of mirror triangle {}: its rays lie on both sides of the sweeping triangle for λ \
-                 from {}. The slice runs along one of its rays, from the mirror on the left ({:.4} long), and across ({:.3e} \
+                 from {}. The slice runs along one of its rays, away from the mirror ({:.4} long), and across ({:.3e} \
                  wide) the way its neighbours meet it; [slice.svg](slice.svg) has axes. Where the number changes by two is the \
                  caustic.\n",
                 cut.triangle,
@@ -202,7 +202,7 @@ pub(super) fn markdown(findings: &Findings) -> String {
          {images}\n![histogram](histogram.svg)\n\n{one_camera_table}\n\
          ![images](images.png)\n\n\
          Each mirror pixel by the number of images of the object's point that is seen there: blue 1, yellow 2, red 3, green 4, \
-         violet 5, pink 6, teal 7, white more; dark where none is seen.\n\n\
+         violet 5, pink 6, teal 7, brown 8, slate 9, lime 10, crimson 11, white more; dark where none is seen.\n\n\
          ![plane](plane.png)\n\n\
          The same over the upright plane through the mirrors and the eye, {side:.3} wide; dark where nothing is seen.\n\n\
          ## Caustic\n\n\
