@@ -41,6 +41,7 @@ enum Verb {
     Info(commands::info::InfoArgs),
     Bench(Box<BenchArgs>),
     Analyze(Box<commands::analyze::AnalyzeArgs>),
+    Paths(commands::paths::PathsArgs),
 }
 
 fn main() -> ExitCode {
@@ -98,6 +99,7 @@ fn run(
         (Some(Verb::Compare(args)), _) => commands::compare::run(args.clone()),
         (Some(Verb::Info(args)), _) => commands::info::run(args, cx),
         (Some(Verb::Analyze(args)), _) => commands::analyze::run(args, cx),
+        (Some(Verb::Paths(args)), _) => commands::paths::run(args, cx),
         (Some(Verb::Bench(args)), Some(own)) => {
             let What::Layer(layer) = &args.what;
             let own = own.subcommand().map_or(own, |(_, own)| own);

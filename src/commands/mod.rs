@@ -5,6 +5,7 @@ pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod info;
 mod memory;
+pub(crate) mod paths;
 pub(crate) mod render;
 #[cfg(feature = "viewer")]
 pub(crate) mod view;
@@ -133,26 +134,10 @@ impl SceneArgs {
         }
     }
 
-    /// Sets the number of threads for everything that follows.
-    fn start_threads(&self) -> anyhow::Result<()> {
-        if let Some(n) = self.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(usize::try_from(n)?)
-                .build_global()
-                .context("--threads: the threads could not be started")?;
-        }
-        Ok(())
-    }
-
     /// What can be refused before anything is read, and the threads.
     pub(crate) fn begin(&self) -> anyhow::Result<()> {
         memory::check(self.surfels, self.size)?;
-        if let Err(name) = requested_level() {
-            let problem = format!("{name:?} is not an instruction set");
-            let remedy = "unset it, or choose sse2, sse4.2, avx2 or avx512";
-            return Err(Error::input(SIMD_VARIABLE, "", problem, remedy).into());
-        }
-        self.start_threads()
+        begin(self.threads)
     }
 
     /// The scene that is asked for.
@@ -195,6 +180,22 @@ impl SceneArgs {
     pub(crate) fn eye(&self, scene: &PreparedScene) -> Result<Eye> {
         seen(scene.eye_for(self.size), "--eye, --target, --fov")
     }
+}
+
+/// Refuses an unknown instruction set, and sets the number of threads for everything that follows.
+pub(crate) fn begin(threads: Option<u64>) -> anyhow::Result<()> {
+    if let Err(name) = requested_level() {
+        let problem = format!("{name:?} is not an instruction set");
+        let remedy = "unset it, or choose sse2, sse4.2, avx2 or avx512";
+        return Err(Error::input(SIMD_VARIABLE, "", problem, remedy).into());
+    }
+    if let Some(n) = threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::try_from(n)?)
+            .build_global()
+            .context("--threads: the threads could not be started")?;
+    }
+    Ok(())
 }
 
 impl Ready {

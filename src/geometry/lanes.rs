@@ -5,7 +5,8 @@
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use fearless_simd::{
-    Level, Select, Simd, SimdBase, SimdFloat, SimdFrom, SimdMask, f32x8, f32x16, u32x8, u32x16,
+    Level, Select, Simd, SimdBase, SimdFloat, SimdFrom, SimdMask, f32x8, f32x16, f64x8, u32x8,
+    u32x16,
 };
 
 /// A scalar that camera constants are stored in.
@@ -21,6 +22,8 @@ pub trait Scalar:
     /// Square root of the precision: the error of one more step of a method that converges quadratically is below
     /// the precision when its last step was below this.
     const ROOT_EPSILON: f64;
+    /// Steps after which bisection alone ends at the precision, or nearly so.
+    const ROOT_STEPS: usize;
     /// Rounds to this type.
     fn from_f64(value: f64) -> Self;
     /// Exact.
@@ -29,6 +32,7 @@ pub trait Scalar:
 
 impl Scalar for f32 {
     const ROOT_EPSILON: f64 = 1.0 / (1 << 12) as f64;
+    const ROOT_STEPS: usize = 24;
     #[expect(clippy::cast_possible_truncation, reason = "the one rounding")]
     fn from_f64(value: f64) -> Self {
         value as Self
@@ -40,6 +44,7 @@ impl Scalar for f32 {
 
 impl Scalar for f64 {
     const ROOT_EPSILON: f64 = 1.0 / (1 << 26) as f64;
+    const ROOT_STEPS: usize = 56;
     fn from_f64(value: f64) -> Self {
         value
     }
@@ -165,12 +170,12 @@ pub trait Vector<S: Simd>: Real<Scalar = f32> {
 }
 
 macro_rules! vector_real {
-    ($t:ident, $u:ident, $n:literal) => {
+    ($t:ident, $scalar:ty) => {
         impl<S: Simd> Real for $t<S> {
-            type Scalar = f32;
+            type Scalar = $scalar;
             type Mask = <Self as SimdBase<S>>::Mask;
             #[inline(always)]
-            fn splat(self, value: f32) -> Self {
+            fn splat(self, value: $scalar) -> Self {
                 Self::simd_from(fearless_simd::ExtractToken::token(&self), value)
             }
             #[inline(always)]
@@ -202,7 +207,14 @@ macro_rules! vector_real {
                 SimdFloat::floor(self)
             }
         }
+    };
+}
+vector_real!(f32x8, f32);
+vector_real!(f32x16, f32);
+vector_real!(f64x8, f64);
 
+macro_rules! vector_of_floats {
+    ($t:ident, $u:ident, $n:literal) => {
         impl<S: Simd> Vector<S> for $t<S> {
             const LANES: u32 = $n;
             #[inline(always)]
@@ -249,8 +261,8 @@ macro_rules! vector_real {
         }
     };
 }
-vector_real!(f32x8, u32x8, 8);
-vector_real!(f32x16, u32x16, 16);
+vector_of_floats!(f32x8, u32x8, 8);
+vector_of_floats!(f32x16, u32x16, 16);
 
 /// Two vectors side by side: a kernel whose operations wait for each other runs two chains at once.
 #[derive(Clone, Copy, Debug)]

@@ -174,7 +174,7 @@ pub(super) fn output_error(path: &Path, problem: impl ToString) -> Error {
 }
 
 /// What the system said, without the name of the file aside.
-fn plain(error: &std::io::Error) -> String {
+pub(super) fn plain(error: &std::io::Error) -> String {
     match error.kind() {
         std::io::ErrorKind::NotFound => "its folder does not exist".into(),
         kind => kind.to_string(),
@@ -195,12 +195,12 @@ fn picture_error(path: &Path, error: &ImageError) -> Error {
 }
 
 /// Whether `path` is free or a plain file, so that a rename onto it does what was meant.
-fn replaceable(path: &Path) -> bool {
+pub(super) fn replaceable(path: &Path) -> bool {
     path.symlink_metadata().map_or(true, |there| there.is_file())
 }
 
 /// An empty file in the folder of `path` that vanishes unless it is persisted.
-fn write_aside(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+pub(super) fn write_aside(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

@@ -9,6 +9,8 @@ pub mod flip;
 pub mod io;
 pub mod picture;
 pub mod planes;
+#[cfg(feature = "cli")]
+pub mod streamed;
 pub mod temporal;
 
 pub use picture::Picture;

@@ -71,22 +71,27 @@ pub(super) fn cameras(scene: &PathScene, eye: DVec3, scale: RayScale) -> Vec<Cam
 
 impl Camera {
     /// Hands every image of a point (relative to the scene's origin) to `visit`, λ rising.
-    pub(super) fn images(&self, index: u32, point: DVec3, mut visit: impl FnMut(Image)) {
+    pub(super) fn images(&self, index: u32, point: DVec3, visit: impl FnMut(Image)) {
         let q = (point - self.rays.origins[0]).to_array();
-        for &lambda in roots(&self.three_ray, q).as_slice() {
-            let image = self.three_ray.image_at(q, lambda, true);
-            let weights = [image.b1(), image.b2, image.b3];
-            let sum = |values: [f64; 3]| (0..3).map(|i| weights[i] * values[i]).sum::<f64>();
-            let inside = image.found && weights.iter().all(|w| *w >= -TIE);
-            if !inside || !(sum(self.facing) > 0.0) {
-                continue;
-            }
-            let (_, d) = self.rays.at(DVec3::from_array(weights));
-            if lambda * d.length() > TIE * sum(self.eye_distance) {
-                let on_edge = weights.iter().any(|w| *w < TIE);
-                visit(Image { camera: index, lambda, weights, on_edge });
-            }
+        let roots = roots(&self.three_ray, q);
+        let images = roots.as_slice().iter().filter_map(|l| self.image_at(index, point, *l));
+        images.for_each(visit);
+    }
+
+    /// The image of a point at a root λ of its cubic, if it lies in the camera.
+    pub(super) fn image_at(&self, index: u32, point: DVec3, lambda: f64) -> Option<Image> {
+        let q = (point - self.rays.origins[0]).to_array();
+        let image = self.three_ray.image_at(q, lambda, true);
+        let weights = [image.b1(), image.b2, image.b3];
+        let sum = |values: [f64; 3]| (0..3).map(|i| weights[i] * values[i]).sum::<f64>();
+        let inside = image.found && weights.iter().all(|w| *w >= -TIE);
+        if !(inside && sum(self.facing) > 0.0) {
+            return None;
         }
+        let (_, d) = self.rays.at(DVec3::from_array(weights));
+        let apart = lambda * d.length() > TIE * sum(self.eye_distance);
+        let on_edge = weights.iter().any(|w| *w < TIE);
+        apart.then_some(Image { camera: index, lambda, weights, on_edge })
     }
 
     /// N(λ), the normal of T(λ).
@@ -94,6 +99,12 @@ impl Camera {
         let [v, d] = [self.rays.origins, self.rays.directions];
         let e = |i: usize| v[i] - v[0] + (d[i] - d[0]) * lambda;
         e(1).cross(e(2))
+    }
+
+    /// Whether the ray at `w` leaves the front of the smooth surface.
+    #[cfg(test)]
+    pub(super) fn faces(&self, w: [f64; 3]) -> bool {
+        (0..3).map(|i| w[i] * self.facing[i]).sum::<f64>() > 1e-9
     }
 
     /// v(w).

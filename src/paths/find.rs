@@ -2,16 +2,22 @@
 
 use std::ops::Range;
 
+use fearless_simd::Level;
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::cameras::{Camera, Image, cameras};
 use super::hierarchy::Hierarchy;
+use super::occlusion::occlude;
+use super::packet::Packet;
+use super::refine::{Refined, refine};
 use super::surfaces::PathScene;
-use super::{NEAR_CAUSTIC, Path};
+use super::{NEAR_CAUSTIC, Occluder, Path, Refinement};
 use crate::camera::RayScale;
+use crate::camera::mirror_ray::reflect;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::lanes::simd_level;
 
 /// What is to be found out about paths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +85,7 @@ pub struct PathFinder<'a> {
     pub(super) options: PathOptions,
     pub(super) cameras: Vec<Camera>,
     hierarchy: Hierarchy,
+    level: Level,
 }
 
 impl<'a> PathFinder<'a> {
@@ -94,7 +101,7 @@ impl<'a> PathFinder<'a> {
         let eye = eye - scene.origin;
         let cameras = cameras(scene, eye, options.ray_scale);
         let hierarchy = Hierarchy::new(&cameras);
-        Ok(Self { scene, eye, options, cameras, hierarchy })
+        Ok(Self { scene, eye, options, cameras, hierarchy, level: simd_level() })
     }
 
     /// Number of cameras: mirror triangles that face the eye in part.
@@ -109,12 +116,17 @@ impl<'a> PathFinder<'a> {
     pub fn find(&self, points: &[DVec3], cx: &Context) -> Result<PathSet> {
         let groups = self.groups(points, cx, |group, images| {
             let mut ends = vec![0; group.len()];
-            let list = (1..).zip(images).map(|(end, (slot, image))| {
-                let slot = *slot as usize;
-                ends[slot] = end;
-                self.path(points[group[slot] as usize] - self.scene.origin, image)
-            });
-            (list.collect::<Vec<Path>>(), group.to_vec(), ends)
+            let at = |slot: u32| points[group[slot as usize] as usize] - self.scene.origin;
+            for (end, (slot, _)) in (1..).zip(images) {
+                ends[*slot as usize] = end;
+            }
+            let mut list: Vec<Path> =
+                images.iter().map(|(slot, image)| self.path(at(*slot), image)).collect();
+            if self.options.occlusion {
+                let points: Vec<DVec3> = images.iter().map(|(slot, _)| at(*slot)).collect();
+                occlude(self.scene, self.eye, &points, &mut list);
+            }
+            (list, group.to_vec(), ends)
         })?;
         let mut set = PathSet { lists: Vec::new(), places: vec![(0, 0..0); points.len()] };
         for (list, group, ends) in groups {
@@ -181,13 +193,18 @@ impl<'a> PathFinder<'a> {
         if !min.is_finite() {
             return found;
         }
+        let packet = Packet::new(points);
         self.hierarchy.visit(min, max, |index| {
             let camera = &self.cameras[index as usize];
-            for (slot, point) in (0..).zip(points) {
-                if point.is_finite() {
-                    camera.images(index, *point, |image| found.push((slot, image)));
+            packet.visit(self.level, camera, &mut |slot, lambda| {
+                let point = points[slot];
+                let mut add = |image| found.push((narrow(slot), image));
+                match lambda {
+                    _ if !point.is_finite() => {}
+                    Some(lambda) => camera.image_at(index, point, lambda).into_iter().for_each(add),
+                    None => camera.images(index, point, &mut add),
                 }
-            }
+            });
         });
         found.sort_unstable_by(|(a, x), (b, y)| {
             (a, x.camera).cmp(&(b, y.camera)).then(x.lambda.total_cmp(&y.lambda))
@@ -233,27 +250,38 @@ impl<'a> PathFinder<'a> {
         (det, det.abs() / (normal.length() * d.length()))
     }
 
-    /// The path of an image of `point` (relative to the origin).
+    /// The path of an image of `point` (relative to the origin), as if nothing were in the way.
     fn path(&self, point: DVec3, image: &Image) -> Path {
         let camera = &self.cameras[image.camera as usize];
-        let mirror_point = camera.mirror_point(image.weights);
+        let surface = &self.scene.mirrors[camera.mirror as usize];
+        let refined =
+            { self.options.refine }.then(|| refine(surface, camera, image, self.eye, point));
+        let (refinement, at) = match refined {
+            Some(Some(at)) => (Refinement::Surface, at),
+            not => {
+                let point = camera.mirror_point(image.weights);
+                let normal = surface.normal(camera.triangle as usize, image.weights);
+                let failed = if not.is_some() { Refinement::Failed } else { Refinement::Camera };
+                (failed, Refined { point, normal })
+            }
+        };
         let (det_j, caustic_sine) = self.caustic(image);
-        let mut path = Path {
+        let (view, onward) = (at.point - self.eye, point - at.point);
+        let away = reflect(view, at.normal).normalize_or_zero();
+        Path {
             mirror: camera.mirror,
             triangle: camera.triangle,
             weights: image.weights,
-            mirror_point,
+            mirror_point: at.point + self.scene.origin,
             lambda: image.lambda,
-            length: mirror_point.distance(self.eye) + mirror_point.distance(point),
+            length: view.length() + onward.length(),
             det_j,
             caustic_sine,
-            miss: 0.0,
-            eye_leg: Default::default(),
-            point_leg: Default::default(),
-            refinement: Default::default(),
-        };
-        path.mirror_point += self.scene.origin;
-        path
+            miss: (onward - away * onward.dot(away).max(0.0)).length(),
+            eye_leg: Occluder::None,
+            point_leg: Occluder::None,
+            refinement,
+        }
     }
 }
 

@@ -12,8 +12,13 @@
 mod cameras;
 mod find;
 mod hierarchy;
+mod occlusion;
+mod packet;
+mod refine;
 mod roots;
 mod surfaces;
+#[cfg(feature = "cli")]
+pub mod table;
 #[cfg(test)]
 mod tests;
 

@@ -10,8 +10,9 @@ pub struct Cubic<R> {
     pub c: [R; 4],
 }
 
-/// Enough for bisection alone to end at the precision of f32; a smooth piece takes two or three.
-pub(crate) const MAX_STEPS: usize = 24;
+/// Steps to a root in f32; a smooth piece takes two or three.
+#[cfg(feature = "gpu")]
+pub(crate) const MAX_STEPS: usize = <f32 as Scalar>::ROOT_STEPS;
 
 impl<R: Real> Cubic<R> {
     /// F(λ).
@@ -79,7 +80,7 @@ impl<R: Real> Cubic<R> {
         let mut x = lo - f_lo * ((hi - lo) / (f_hi - f_lo));
         x = R::select(lo.le(x) & x.le(hi), x, (lo + hi) * half);
         let mut active = exists;
-        for _ in 0..MAX_STEPS {
+        for _ in 0..R::Scalar::ROOT_STEPS {
             let f = self.value(x);
             let below = (rising & f.lt(zero)) | (falling & zero.lt(f));
             a = R::select(below, x, a);

@@ -5,7 +5,10 @@ mod knot;
 mod revolution;
 mod round;
 mod sheets;
+mod smooth;
 mod teapot;
+
+pub(crate) use smooth::SmoothSurface;
 
 use crate::geometry::Mesh;
 
@@ -57,9 +60,21 @@ pub const SHAPES: &[&str] = &NAMES;
 /// what a shape needs to be recognised (and above 2²⁴) the wish is clamped. Normals are those of the smooth
 /// surface, outward or to the mirror side; triangles are counter-clockwise seen from there.
 pub fn shape(name: &str, triangles: Option<usize>) -> Option<Mesh> {
+    let (shape, wanted) = find(name, triangles)?;
+    Some((shape.make)(wanted))
+}
+
+/// The surface in closed form that [`shape`] of the same arguments approximates; `None` for shapes without one.
+pub(crate) fn smooth(name: &str, triangles: Option<usize>) -> Option<SmoothSurface> {
+    let (shape, wanted) = find(name, triangles)?;
+    SmoothSurface::of(shape.name, wanted)
+}
+
+/// The shape of a name and the triangles that are wanted of it.
+fn find(name: &str, triangles: Option<usize>) -> Option<(&'static Shape, usize)> {
     let shape = TABLE.iter().find(|shape| shape.name == name)?;
     let wanted = triangles.unwrap_or(shape.default).clamp(shape.least, MOST_TRIANGLES);
-    Some((shape.make)(wanted))
+    Some((shape, wanted))
 }
 
 /// The built-in scenes: names and texts.

@@ -13,9 +13,12 @@ pub(super) fn sphere(wanted: usize) -> Mesh {
     ball(wanted).finish()
 }
 
-/// Semi-axes 1, 0.65 and 0.8 along x, y and z about the origin.
+/// Semi-axes of the ellipsoid along x, y and z.
+pub(super) const ELLIPSOID: DVec3 = DVec3::new(1.0, 0.65, 0.8);
+
+/// About the origin.
 pub(super) fn ellipsoid(wanted: usize) -> Mesh {
-    let axes = DVec3::new(1.0, 0.65, 0.8);
+    let axes = ELLIPSOID;
     ball(wanted)
         .map(|v| Vertex { point: v.point * axes, normal: (v.normal / axes).normalize_or(DVec3::Y) })
         .finish()
@@ -26,17 +29,23 @@ fn ball(wanted: usize) -> Builder {
     turn(&[&[half]], 0.0, wanted)
 }
 
-/// Radius 1 to the middle of the tube, tube radius 0.4, about the y axis through the origin.
+/// Radius of the torus to the middle of its tube, and of the tube.
+pub(super) const TORUS: [f64; 2] = [1.0, 0.4];
+
+/// About the y axis through the origin.
 pub(super) fn torus(wanted: usize) -> Mesh {
-    let tube = Piece::Arc(DVec2::X, 0.4, [0.0, -TAU]);
+    let tube = Piece::Arc(DVec2::X * TORUS[0], TORUS[1], [0.0, -TAU]);
     let curves: &[&[Piece]] = &[&[tube]];
     revolution(&Profile { curves, closed: true, finest_radius: 0.0 }, wanted).finish()
 }
 
-/// Radius 0.5, height 1, standing on y = 0, closed.
+/// Radius of the cylinder.
+pub(super) const CYLINDER_RADIUS: f64 = 0.5;
+
+/// Height 1, standing on y = 0, closed.
 pub(super) fn cylinder(wanted: usize) -> Mesh {
-    let [top, edge] = [DVec2::new(0.0, 1.0), DVec2::new(0.5, 1.0)];
-    let [foot, bottom] = [DVec2::new(0.5, 0.0), DVec2::ZERO];
+    let [top, edge] = [DVec2::new(0.0, 1.0), DVec2::new(CYLINDER_RADIUS, 1.0)];
+    let [foot, bottom] = [DVec2::new(CYLINDER_RADIUS, 0.0), DVec2::ZERO];
     let line = Piece::Line;
     turn(&[&[line(top, edge)], &[line(edge, foot)], &[line(foot, bottom)]], 0.0, wanted).finish()
 }
@@ -74,16 +83,32 @@ pub(super) fn goblet(wanted: usize) -> Mesh {
     turn(&[&profile], 0.05, wanted).finish()
 }
 
+/// The bowl's rim, and how far its opening is tilted towards +z, degrees.
+const BOWL: [f64; 2] = [65.0, 65.0];
+
 /// The inside of a bowl: a cap of a sphere of radius 1 out to 65° from its middle, tilted so that its opening
 /// faces +z and a little up, lowest point on y = 0. There is no outside.
 pub(super) fn bowl(wanted: usize) -> Mesh {
-    let rim = 65.0_f64.to_radians();
+    let (tilted, lowest) = tilted_bowl(wanted);
+    tilted.map(|v| Vertex { point: v.point - DVec3::Y * lowest, ..v }).finish()
+}
+
+/// Centre of the bowl's sphere (of radius 1), unit direction from there to the bowl's middle, and cosine from there to the rim.
+pub(super) fn bowl_sphere(wanted: usize) -> (DVec3, DVec3, f64) {
+    let (_, lowest) = tilted_bowl(wanted);
+    let up = DMat3::from_rotation_x(BOWL[1].to_radians()) * DVec3::Y;
+    (up - DVec3::Y * lowest, -up, BOWL[0].to_radians().cos())
+}
+
+/// The bowl about its lowest point before it was tilted, and where its lowest vertex is now.
+fn tilted_bowl(wanted: usize) -> (Builder, f64) {
+    let [rim, tilt] = BOWL.map(f64::to_radians);
     let cap = Piece::Arc(DVec2::Y, 1.0, [-FRAC_PI_2, rim - FRAC_PI_2]);
-    let tilt = DMat3::from_rotation_x(65.0_f64.to_radians());
+    let tilt = DMat3::from_rotation_x(tilt);
     let tilted = turn(&[&[cap]], 0.0, wanted)
         .map(|v| Vertex { point: tilt * v.point, normal: tilt * v.normal });
     let lowest = tilted.lowest();
-    tilted.map(|v| Vertex { point: v.point - DVec3::Y * lowest, ..v }).finish()
+    (tilted, lowest)
 }
 
 fn turn(curves: &[&[Piece]], finest_radius: f64, wanted: usize) -> Builder {

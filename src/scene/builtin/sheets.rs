@@ -57,20 +57,21 @@ fn face(builder: &mut Builder, cuts: [usize; 2], middle: DVec3, axes: [DVec3; 2]
     });
 }
 
+/// Height and width of the wave's sheet, and how far it rises from z = 0: z = rise · cos τx · cos τy.
+pub(super) const WAVE: ([f64; 2], f64) = ([1.5, 2.0], 0.08);
+
 /// An upright sheet of hills, hollows and saddles: 2 wide, 1.5 high, standing on y = 0, facing +z.
 pub(super) fn wave(wanted: usize) -> Mesh {
-    const SIZE: [f64; 2] = [1.5, 2.0];
-    const HEIGHT: f64 = 0.08;
-    let cuts = best_grid(wanted, SIZE[0] / SIZE[1], [2, 2], |rows, columns| 2 * rows * columns);
+    let (size, height) = WAVE;
+    let cuts = best_grid(wanted, size[0] / size[1], [2, 2], |rows, columns| 2 * rows * columns);
     let mut builder = Builder::default();
     builder.grid(cuts, Joints::default(), |i, j| {
-        let x = SIZE[1] * (j as f64 / cuts[1] as f64 - 0.5);
-        let y = SIZE[0] * (1.0 - i as f64 / cuts[0] as f64);
+        let x = size[1] * (j as f64 / cuts[1] as f64 - 0.5);
+        let y = size[0] * (1.0 - i as f64 / cuts[0] as f64);
         let ((sin_x, cos_x), (sin_y, cos_y)) = ((TAU * x).sin_cos(), (TAU * y).sin_cos());
-        // z = h cos τx cos τy
-        let slope = DVec3::new(sin_x * cos_y, cos_x * sin_y, 0.0) * (HEIGHT * TAU);
+        let slope = DVec3::new(sin_x * cos_y, cos_x * sin_y, 0.0) * (height * TAU);
         Vertex {
-            point: DVec3::new(x, y, HEIGHT * cos_x * cos_y),
+            point: DVec3::new(x, y, height * cos_x * cos_y),
             normal: (slope + DVec3::Z).normalize_or(DVec3::Z),
         }
     });

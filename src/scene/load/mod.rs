@@ -12,6 +12,7 @@ use crate::geometry::{Mesh, MeshDefect};
 
 mod obj;
 mod ply;
+pub mod points;
 
 /// Extensions of the formats that [`mesh`] reads, in lower case.
 pub const EXTENSIONS: &[&str] = &["obj", "ply"];

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
@@ -54,7 +54,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], cx: &Context) -> Result<Mesh> {
 }
 
 /// The header, how many lines it has, and what follows it.
-fn header<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Header, usize, &'a [u8])> {
+pub(super) fn header<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Header, usize, &'a [u8])> {
     if !bytes.starts_with(b"ply") {
         return Err(Error::file(path, "line 1", "does not say \"ply\"", "give a PLY file"));
     }
@@ -90,7 +90,7 @@ fn header<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Header, usize, &'a [u8])>
     Ok((header, lines, body))
 }
 
-fn first_line(error: &impl std::fmt::Display) -> String {
+pub(super) fn first_line(error: &impl std::fmt::Display) -> String {
     error.to_string().lines().next().unwrap_or_default().trim_end_matches('.').to_owned()
 }
 
@@ -131,13 +131,13 @@ fn least_bytes(data_type: &PropertyType) -> usize {
 }
 
 /// Which optional properties all vertices have.
-struct Layout {
+pub(super) struct Layout {
     normals: bool,
     color_scale: Option<ColorScale>,
 }
 
 impl Layout {
-    fn of(path: &Path, vertex: Option<&ElementDef>) -> Result<Self> {
+    pub(super) fn of(path: &Path, vertex: Option<&ElementDef>) -> Result<Self> {
         let mut types: [Option<&ScalarType>; 9] = [None; 9];
         for property in vertex.iter().flat_map(|v| v.properties.values()) {
             if let (Some(slot), PropertyType::Scalar(number)) =
@@ -188,7 +188,7 @@ impl ColorScale {
 
 /// Any element: the numbers that matter, each in its slot, and a polygon. f64 holds every number of PLY.
 #[derive(Default)]
-struct Record {
+pub(super) struct Record {
     values: [f64; 9],
     polygon: Vec<f64>,
 }
@@ -218,6 +218,11 @@ impl Record {
         if let Some(slot) = slot(name) {
             self.values[slot] = value;
         }
+    }
+
+    /// Position, as exactly as the file has it.
+    pub(super) fn position(&self) -> DVec3 {
+        DVec3::from_slice(&self.values)
     }
 
     /// Position, normal and colour.
@@ -365,7 +370,7 @@ impl File<'_> {
 }
 
 /// Reads a line of text as an element.
-fn text_record(line: &[u8], element: &ElementDef) -> Result<Record, String> {
+pub(super) fn text_record(line: &[u8], element: &ElementDef) -> Result<Record, String> {
     let line = str::from_utf8(line).map_err(|_| "is not text")?;
     let mut words = line.split_ascii_whitespace();
     let mut number = || {
