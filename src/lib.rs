@@ -62,7 +62,7 @@
 //! | [`methods`] | the registry: a method is one file | all above |
 //! | [`backend`] | executes plans, on the CPU or through wgpu (shaders in `shaders/`) | all above but cull and methods |
 //! | [`frame`] | one frame from end to end | all above |
-//! | [`analysis`] | what a frame does, looked at afterwards: one camera's walk, costs by triangle | all above |
+//! | [`analysis`] | what a frame does, looked at afterwards: one camera's walk, costs by triangle; multiple images and caustics | all above |
 //! | `viewer` (feature `viewer`) | the window: hands in, wishes out; no algorithm | all above |
 //!
 //! Everything may use [`error`] and [`context`]. `tests/architecture.rs` holds the table.

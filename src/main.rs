@@ -40,6 +40,7 @@ enum Verb {
     Compare(commands::compare::Args),
     Info(commands::info::InfoArgs),
     Bench(Box<BenchArgs>),
+    Analyze(Box<commands::analyze::AnalyzeArgs>),
     Paths(commands::paths::PathsArgs),
 }
 
@@ -97,6 +98,7 @@ fn run(
         (Some(Verb::Render(args)), Some(own)) => commands::render::run(args, own, cx),
         (Some(Verb::Compare(args)), _) => commands::compare::run(args.clone()),
         (Some(Verb::Info(args)), _) => commands::info::run(args, cx),
+        (Some(Verb::Analyze(args)), _) => commands::analyze::run(args, cx),
         (Some(Verb::Paths(args)), _) => commands::paths::run(args, cx),
         (Some(Verb::Bench(args)), Some(own)) => {
             let What::Layer(layer) = &args.what;

@@ -1,5 +1,6 @@
 //! The command line: one thin file a verb. It parses, calls the library and writes.
 
+pub(crate) mod analyze;
 pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod info;
@@ -177,8 +178,13 @@ impl SceneArgs {
         let scene = arrange::scene(&self.request(), cx)?;
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
         let scene = PreparedScene::new(&scene, &self.prepare_options(leaf), cx)?;
-        let eye = seen(scene.eye_for(self.size), "--eye, --target, --fov")?;
+        let eye = self.eye(&scene)?;
         Ok(Ready { scene, eye, load_ms })
+    }
+
+    /// The eye of a prepared scene.
+    pub(crate) fn eye(&self, scene: &PreparedScene) -> Result<Eye> {
+        seen(scene.eye_for(self.size), "--eye, --target, --fov")
     }
 }
 

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails where it panics")]
 
+mod analyze;
 mod bad_files;
 mod bad_options;
 #[cfg(feature = "gpu")]

@@ -12,6 +12,7 @@ mod moves;
 mod plane_mirror;
 mod plans;
 mod searches;
+mod roots;
 
 use std::sync::Arc;
 

@@ -4,6 +4,7 @@
 //! at v(w) = Σ w_i v_i and runs along d(w) = Σ w_i d_i. The triangle T(λ) of the points v_i + λ d_i sweeps
 //! the view volume. Constants are made in f64 and rounded once.
 
+pub mod caustic;
 pub mod multiplicity;
 mod paper_test;
 pub mod project;

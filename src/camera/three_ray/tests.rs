@@ -1,9 +1,15 @@
 //! Cameras of random curved mirrors, convex, concave and saddle, against points whose images are known.
 
+mod caustics;
+mod counts;
+mod mirrors;
+mod subdivision;
+mod theorem;
+
 use fearless_simd::{Level, Simd, dispatch, f32x8, f32x16};
 use glam::{DVec2, DVec3};
 
-use super::multiplicity::mixed_sign_range;
+use super::multiplicity::{Jacobian, mixed_sign_range};
 use super::volume::{BoxTest, Boxes};
 use super::*;
 use crate::geometry::lanes::{Real, Vector};
@@ -56,16 +62,22 @@ impl Numbers {
     }
 }
 
+/// Whether tests shall take minutes where they take seconds.
+fn long() -> bool {
+    std::env::var_os("CATOPTRIC_LONG_TESTS").is_some()
+}
+
 fn images<T: Scalar + Real<Scalar = T, Mask = bool>>(
     camera: &ThreeRay<T>,
     point: DVec3,
-    hi: f64,
+    [lo, hi]: [f64; 2],
+    margin: f64,
 ) -> Vec<Image<T>> {
     let v1 = DVec3::from_array(camera.v1.map(Scalar::to_f64));
     let q: [T; 3] = array(point - v1);
     let mut list = Vec::new();
-    for image in project(camera, q, T::from_f64(-1e-5), T::from_f64(hi)).as_slice() {
-        if image.within([T::from_f64(1e-3); 3]) {
+    for image in project(camera, q, T::from_f64(lo), T::from_f64(hi)).as_slice() {
+        if image.within([T::from_f64(margin); 3]) {
             list.push(*image);
         }
     }
@@ -86,10 +98,8 @@ fn finds_the_image_that_made_the_point() {
         let point = v + d * lambda;
         // Near the caustic T(λ) is a sliver or the point has a double root: there the weights are not
         // determined by the point (see `hard_points_keep_their_position`).
-        let det = multiplicity::quadratics(&rays).map(|c| c[0] + lambda * (c[1] + lambda * c[2]));
-        let det = DVec3::from_array(det).dot(w);
-        let size = multiplicity::quadratics(&rays).map(|c| c[0]);
-        if det.abs() < 1e-2 * size[0].abs() {
+        let jacobian = Jacobian::of(&rays);
+        if jacobian.at(lambda).dot(w).abs() < 1e-2 * jacobian.g[0][0].abs() {
             continue;
         }
         let exact = ThreeRay::<f64>::new(&rays, &rays);
@@ -97,11 +107,11 @@ fn finds_the_image_that_made_the_point() {
             (b2 - w.y).abs().max((b3 - w.z).abs()).max((l - lambda).abs() / (1.0 + lambda))
         };
         let least = |errors: Vec<f64>| errors.into_iter().fold(f64::INFINITY, f64::min);
-        let found = images(&exact, point, 10.0);
+        let found = images(&exact, point, [-1e-5, 10.0], 1e-3);
         let e64 = least(found.iter().map(|i| error(i.b2, i.b3, i.lambda)).collect());
         lost += usize::from(e64 > 1e-6);
         let rounded = ThreeRay::<f32>::new(&rays, &rays);
-        let found = images(&rounded, point, 10.0);
+        let found = images(&rounded, point, [-1e-5, 10.0], 1e-3);
         let e32 =
             least(found.iter().map(|i| error(i.b2.into(), i.b3.into(), i.lambda.into())).collect());
         blurred += usize::from(e32 > 2e-2);
@@ -118,7 +128,7 @@ fn hard_points_keep_their_position() {
     while tried < 5000 {
         let rays = numbers.camera(0.3, RayScale::EyeDistance);
         let w = numbers.weights();
-        let g = multiplicity::quadratics(&rays);
+        let g = Jacobian::of(&rays).g;
         let c: [f64; 3] = [0, 1, 2].map(|k| DVec3::new(g[0][k], g[1][k], g[2][k]).dot(w));
         let disc = c[1] * c[1] - 4.0 * c[0] * c[2];
         let lambda = (-c[1] - disc.max(0.0).sqrt()) / (2.0 * c[2]);
@@ -129,7 +139,7 @@ fn hard_points_keep_their_position() {
         let (v, d) = rays.at(w);
         let point = v + d * (lambda * (1.0 + 1e-4));
         let camera = ThreeRay::<f32>::new(&rays, &rays);
-        let near = images(&camera, point, 10.0).iter().any(|i| {
+        let near = images(&camera, point, [-1e-5, 10.0], 1e-3).iter().any(|i| {
             let w = DVec3::new(i.b1().into(), i.b2.into(), i.b3.into());
             let (v, d) = rays.at(w);
             (v + d * f64::from(i.lambda)).distance(point) < 1e-4 * point.length()
@@ -155,7 +165,7 @@ fn plane_mirror_is_exact_with_eye_distance_rays() {
         let point = v + d * lambda;
         let mirrored = eye * DVec3::new(1.0, 1.0, -1.0);
         let camera = ThreeRay::<f64>::new(&rays, &rays);
-        let found = images(&camera, point, 20.0);
+        let found = images(&camera, point, [-1e-5, 20.0], 1e-3);
         let image = found.iter().find(|i| (i.lambda - lambda).abs() < 1e-6).expect("an image");
         let hit = rays.at(DVec3::new(image.b1(), image.b2, image.b3)).0;
         let along = (point - mirrored).normalize_or(DVec3::Z);
@@ -244,7 +254,7 @@ fn outside_the_mixed_range_a_point_has_one_image() {
         let (w, lambda) = (numbers.weights(), numbers.between(0.0, 4.0));
         let (v, d) = rays.at(w);
         let camera = ThreeRay::<f64>::new(&rays, &rays);
-        let mut found = images(&camera, v + d * lambda, 1e3);
+        let mut found = images(&camera, v + d * lambda, [-1e-5, 1e3], 1e-3);
         found.retain(|i| i.within([0.0; 3]));
         let mixed = mixed_sign_range(&rays, 0.0, 1e3);
         if mixed.is_some_and(|(lo, hi)| (lo..=hi).contains(&lambda)) {
@@ -392,7 +402,7 @@ fn refused<S: Simd, const N: usize>(
 
 /// The λ in 0..20 at which the ray `w` meets the caustic.
 fn caustic(rays: &Rays, w: DVec3) -> Option<f64> {
-    let g = multiplicity::quadratics(rays);
+    let g = Jacobian::of(rays).g;
     let c: [f64; 3] = [0, 1, 2].map(|k| DVec3::new(g[0][k], g[1][k], g[2][k]).dot(w));
     let disc = c[1] * c[1] - 4.0 * c[0] * c[2];
     let lambda = (-c[1] - disc.max(0.0).sqrt()) / (2.0 * c[2]);

@@ -8,7 +8,7 @@ use super::super::shaders;
 use super::{device, run};
 use crate::backend::cpu::splat::projection as constants;
 use crate::camera::RayScale;
-use crate::camera::three_ray::multiplicity::quadratics;
+use crate::camera::three_ray::multiplicity::Jacobian;
 use crate::camera::three_ray::tests::Numbers;
 use crate::camera::three_ray::{Rays, ThreeRay, project};
 use crate::geometry::lanes::{Real, Scalar};
@@ -52,7 +52,7 @@ fn cases(count: usize) -> Vec<Case> {
             "near-double roots" => {
                 // Where T(λ) has no area at w: two images meet.
                 let [a, b, c] = [0, 1, 2].map(|k| {
-                    let of = quadratics(&rays).map(|q| q[k]);
+                    let of = Jacobian::of(&rays).g.map(|q| q[k]);
                     DVec3::from_array(of).dot(w)
                 });
                 let root = (b * b - 4.0 * a * c).max(0.0).sqrt();
