@@ -101,9 +101,11 @@ fn run(
         (Some(Verb::Analyze(args)), _) => commands::analyze::run(args, cx),
         (Some(Verb::Paths(args)), _) => commands::paths::run(args, cx),
         (Some(Verb::Bench(args)), Some(own)) => {
-            let What::Layer(layer) = &args.what;
             let own = own.subcommand().map_or(own, |(_, own)| own);
-            commands::bench::layer(layer, own, cx)
+            match &args.what {
+                What::Layer(layer) => commands::bench::layer(layer, own, cx),
+                What::Methods(methods) => commands::bench::methods::run(methods, cx),
+            }
         }
         _ => built_in_scene(started, cx),
     }

@@ -224,7 +224,7 @@ fn to_json(found: &Comparison, place: &Where, names: &[String]) -> Value {
 }
 
 /// Linear colour of a FLIP value: black, violet, red, orange, white in even steps of growing lightness.
-fn heat(value: f32) -> [f32; 3] {
+pub(crate) fn heat(value: f32) -> [f32; 3] {
     const STOPS: [[f32; 3]; 5] =
         [[0.0; 3], [0.30, 0.08, 0.45], [0.80, 0.20, 0.35], [1.0, 0.65, 0.30], [1.0; 3]];
     let position = value.clamp(0.0, 1.0) * 4.0;

@@ -6,6 +6,7 @@ pub(crate) mod compare;
 pub(crate) mod info;
 mod memory;
 pub(crate) mod paths;
+mod plots;
 pub(crate) mod render;
 #[cfg(feature = "viewer")]
 pub(crate) mod view;
@@ -18,9 +19,11 @@ use catoptric::accel::KdTreeLimits;
 use catoptric::camera::Eye;
 use catoptric::camera::eye::ImageSize;
 use catoptric::geometry::lanes::{SIMD_VARIABLE, requested_level};
+use catoptric::image::io::check_place;
 use catoptric::image::io::write_bytes;
 use catoptric::methods::{METHODS, Method, MethodInfo, Params, method};
 use catoptric::scene::arrange::{self, Request};
+use catoptric::scene::description::Scene;
 use catoptric::scene::prepared::{DEFAULT_SURFELS, PrepareOptions, PreparedScene};
 use catoptric::{Context, Error, Result};
 use clap::{Arg, ArgMatches, Args, Command};
@@ -117,6 +120,8 @@ pub(crate) struct Ready {
     pub(crate) scene: PreparedScene,
     pub(crate) eye: Eye,
     pub(crate) load_ms: f64,
+    /// What it was made from.
+    pub(crate) described: Scene,
 }
 
 impl SceneArgs {
@@ -175,11 +180,11 @@ impl SceneArgs {
     pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
         self.begin()?;
         let start = Instant::now();
-        let scene = arrange::scene(&self.request(), cx)?;
+        let described = arrange::scene(&self.request(), cx)?;
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
-        let scene = PreparedScene::new(&scene, &self.prepare_options(leaf), cx)?;
+        let scene = PreparedScene::new(&described, &self.prepare_options(leaf), cx)?;
         let eye = self.eye(&scene)?;
-        Ok(Ready { scene, eye, load_ms })
+        Ok(Ready { scene, eye, load_ms, described })
     }
 
     /// The eye of a prepared scene.
@@ -221,6 +226,18 @@ fn seen(eye: Option<Eye>, options: &str) -> Result<Eye> {
             "let the eye differ from the target, not look along its up vector, and take 0 < fov < 180",
         )
     })
+}
+
+/// Refuses a folder that cannot be written before any work is done.
+pub(crate) fn check_folder(folder: &Path) -> Result<()> {
+    if folder.is_dir() {
+        return check_place(&folder.join("methods.md"));
+    }
+    if folder.exists() {
+        let remedy = "give the name of a folder";
+        return Err(Error::file(folder, "", "is a file, and a folder is written", remedy));
+    }
+    check_place(folder)
 }
 
 /// Adds the flags of all methods' parameters to a command.

@@ -98,30 +98,32 @@ impl HowArgs {
 
     /// A renderer on the backend that is asked for.
     pub(crate) fn renderer(&self, method: &dyn Method) -> anyhow::Result<Renderer> {
-        let backend: Box<dyn Backend> = match self.backend.as_str() {
+        Ok(Renderer::on(self.backend(method)?))
+    }
+
+    /// The backend that is asked for.
+    pub(crate) fn backend(&self, method: &dyn Method) -> Result<Box<dyn Backend>, Error> {
+        Ok(match self.backend.as_str() {
             "cpu" if self.adapter.is_some() => {
                 let problem = "is for --backend gpu";
-                return Err(
-                    Error::input("--adapter", "", problem, "leave one of the two out").into()
-                );
+                return Err(Error::input("--adapter", "", problem, "leave one of the two out"));
             }
             "cpu" => Box::new(Cpu::default()),
             "gpu" => self.gpu(method)?,
             _ if self.adapter.is_some() => self.gpu(method)?,
             _ => fastest(method.info().has_shaders),
-        };
-        Ok(Renderer::on(backend))
+        })
     }
 
     #[cfg(feature = "gpu")]
-    fn gpu(&self, method: &dyn Method) -> anyhow::Result<Box<dyn Backend>> {
+    fn gpu(&self, method: &dyn Method) -> Result<Box<dyn Backend>, Error> {
         if !method.info().has_shaders {
             let problem = format!("--method {} has no shaders", method.info().id);
             let (option, remedy) = match self.adapter {
                 Some(_) => ("--adapter", "leave it out"),
                 None => ("--backend gpu", "use --backend cpu, or auto"),
             };
-            return Err(Error::input(option, "", problem, remedy).into());
+            return Err(Error::input(option, "", problem, remedy));
         }
         let path = match self.gpu_path.as_str() {
             "vertex" => gpu::Path::Vertex,
@@ -137,9 +139,9 @@ impl HowArgs {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn gpu(&self, _method: &dyn Method) -> anyhow::Result<Box<dyn Backend>> {
+    fn gpu(&self, _method: &dyn Method) -> Result<Box<dyn Backend>, Error> {
         let problem = "this program was built without the feature gpu";
-        Err(Error::input("--backend gpu", "", problem, "use --backend cpu").into())
+        Err(Error::input("--backend gpu", "", problem, "use --backend cpu"))
     }
 }
 

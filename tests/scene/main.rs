@@ -11,8 +11,8 @@ mod light;
 mod moves;
 mod plane_mirror;
 mod plans;
-mod searches;
 mod roots;
+mod searches;
 
 use std::sync::Arc;
 

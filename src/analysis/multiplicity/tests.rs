@@ -8,7 +8,7 @@ use super::*;
 use crate::camera::eye::ImageSize;
 use crate::context::Context;
 use crate::geometry::Similarity;
-use crate::paths::{PathOptions, PathScene};
+use crate::paths::{PathFinder, PathOptions, PathScene};
 use crate::scene::description::{Environment, EyeDescription, Light, Mirror, Object, Paint, Scene};
 use crate::scene::{PrepareOptions, builtin};
 use crate::visibility::{Scratch, SurfaceMesh, Visibility};
@@ -26,6 +26,7 @@ fn described(mirror: &str, triangles: usize, eye: DVec3) -> Scene {
             source: None,
             transform: Similarity::IDENTITY,
             tint: Vec3::ONE,
+            proxy: None,
         }],
         objects: vec![Object {
             name: "knot".into(),
@@ -36,7 +37,7 @@ fn described(mirror: &str, triangles: usize, eye: DVec3) -> Scene {
             density: 1.0,
         }],
         environment: Environment::Constant(Vec3::ONE),
-        light: Light::default(),
+        light: Light { to_sun: glam::Vec3::Y, sun: glam::Vec3::ONE, ambient: glam::Vec3::ONE },
     }
 }
 

@@ -15,7 +15,7 @@ use catoptric::backend::cpu::finish;
 use catoptric::camera::three_ray::multiplicity::Class;
 use catoptric::camera::{Eye, RayScale};
 use catoptric::image::Picture;
-use catoptric::image::io::{check_place, write_bytes, write_picture};
+use catoptric::image::io::{write_bytes, write_picture};
 use catoptric::paths::{PathFinder, PathOptions, PathScene};
 use catoptric::scene::arrange;
 use catoptric::scene::prepared::PreparedScene;
@@ -24,7 +24,7 @@ use catoptric::{Context, Error, Result};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 
-use super::{SceneArgs, check_json, say, write_json};
+use super::{SceneArgs, check_folder, check_json, say, write_json};
 
 /// Analyze a scene's mirrors as the eye sees them: multiple images and caustics
 ///
@@ -116,18 +116,6 @@ pub(crate) fn run(args: &AnalyzeArgs, cx: &Context) -> anyhow::Result<()> {
     say!("{}", report::summary(&findings));
     say!("The report is {}", args.output.join("report.md").display());
     Ok(())
-}
-
-/// Refuses a folder that cannot be written before any work is done.
-fn check_folder(folder: &Path) -> Result<()> {
-    if folder.is_dir() {
-        return check_place(&folder.join("report.md"));
-    }
-    if folder.exists() {
-        let remedy = "give the name of a folder";
-        return Err(Error::file(folder, "", "is a file, and a folder is written", remedy));
-    }
-    check_place(folder)
 }
 
 fn find(args: &AnalyzeArgs, cx: &Context) -> anyhow::Result<Findings> {

@@ -4,13 +4,7 @@ use catoptric::analysis::multiplicity::{COUNT_COLORS, ImageHistogram};
 use plotters::prelude::*;
 
 use super::CameraSlice;
-
-const SIZE: (u32, u32) = (760, 460);
-const FONT: (&str, i32) = ("sans-serif", 15);
-
-fn failed(error: impl std::fmt::Display) -> anyhow::Error {
-    anyhow::anyhow!("a plot could not be drawn: {error}")
-}
+use crate::commands::plots::{FONT, SIZE, failed};
 
 fn color(images: u32) -> RGBColor {
     let [r, g, b] = COUNT_COLORS[(images as usize).min(COUNT_COLORS.len() - 1)];

@@ -47,6 +47,7 @@ pub(super) fn scene(mirrors: &[(&str, usize, Similarity)]) -> Scene {
         source: Some(Source::Shape { name: (*name).into(), triangles: Some(*triangles) }),
         transform: *transform,
         tint: glam::Vec3::ONE,
+        proxy: None,
     };
     let (up, fov_y) = (DVec3::Y, 0.8);
     let light = Light { to_sun: glam::Vec3::Y, sun: glam::Vec3::ONE, ambient: glam::Vec3::ONE };

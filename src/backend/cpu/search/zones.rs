@@ -1,10 +1,10 @@
 //! Hollow mirrors show what is near them upright and what is far from them upside down; between these zones (Roger &
 //! Holzschuch section 4.4) a point has several images, of which a search finds one.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::images::Reflecting;
-use crate::camera::three_ray::multiplicity::quadratics;
+use crate::camera::three_ray::multiplicity::Jacobian;
 use crate::error::Result;
 
 /// Vertices of an object that are looked at.
@@ -21,7 +21,10 @@ pub(super) fn notes(reflecting: &Reflecting<'_>) -> Result<Vec<String>> {
         let sample: Vec<Vec3> = object.positions.iter().copied().step_by(every).collect();
         let mut zones = [false; 3];
         for (rays, lambda) in reflecting.paths(&sample)? {
-            zones[folds_before(&quadratics(&rays), lambda)] = true;
+            // How often neighbouring rays have crossed before: twice at most.
+            let folds = Jacobian::of(&rays).folds_on_ray(DVec3::splat(1.0 / 3.0));
+            let before = |fold: &f64| (0.0..lambda).contains(fold);
+            zones[folds.into_iter().flatten().filter(before).count()] = true;
         }
         if zones[1] || (zones[0] && zones[2]) {
             notes.push(format!(
@@ -31,15 +34,4 @@ pub(super) fn notes(reflecting: &Reflecting<'_>) -> Result<Vec<String>> {
         }
     }
     Ok(notes)
-}
-
-/// How many times neighbouring rays have crossed before λ: the sign changes of det J along the middle ray, 0 to 2.
-fn folds_before(g: &[[f64; 3]; 3], lambda: f64) -> usize {
-    let [c, b, a] = [0, 1, 2].map(|k| (g[0][k] + g[1][k] + g[2][k]) / 3.0);
-    let discriminant = b * b - 4.0 * a * c;
-    if discriminant < 0.0 {
-        return 0;
-    }
-    let t = -0.5 * (b + discriminant.sqrt().copysign(b));
-    [t / a, c / t].into_iter().filter(|root| (0.0..lambda).contains(root)).count()
 }

@@ -1,5 +1,7 @@
 //! `catoptric bench`: timings as ratios within one run.
 
+pub(crate) mod methods;
+
 use std::path::PathBuf;
 
 use catoptric::frame::{FrameReport, Renderer};
@@ -28,6 +30,12 @@ pub(crate) enum What {
     /// know of in Rust, in tile order on all cores. Neither side includes the id pre-pass, primary rays,
     /// environment or composite.
     Layer(LayerArgs),
+    /// Every method that can draw the scene against many rays a pixel: contact sheet, table, error against time
+    ///
+    /// Writes a folder: the pictures beside the reference with maps of their errors (sheet.png), a table (methods.md,
+    /// methods.json: time by stage, RMSE, PSNR, FLIP, missing share, displacement in pixels, flicker over an orbit) and
+    /// the error over the time with each method's quality knobs turned (error-against-time.svg).
+    Methods(methods::MethodsArgs),
 }
 
 /// See [`What::Layer`].
