@@ -8,7 +8,7 @@ use super::*;
 use crate::camera::eye::ImageSize;
 use crate::context::Context;
 use crate::geometry::Similarity;
-use crate::paths::{PathOptions, PathScene};
+use crate::paths::{PathFinder, PathOptions, PathScene};
 use crate::scene::description::{Environment, EyeDescription, Light, Mirror, Object, Paint, Scene};
 use crate::scene::{PrepareOptions, builtin};
 use crate::visibility::{Scratch, SurfaceMesh, Visibility};
@@ -36,7 +36,7 @@ fn described(mirror: &str, triangles: usize, eye: DVec3) -> Scene {
             density: 1.0,
         }],
         environment: Environment::Constant(Vec3::ONE),
-        light: Light::default(),
+        light: Light { to_sun: Vec3::Y, sun: Vec3::ONE, ambient: Vec3::ONE },
     }
 }
 

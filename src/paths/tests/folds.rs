@@ -1,7 +1,7 @@
 //! Points on shared edges, corners and folds: every image is found, and counted once.
 
 use super::*;
-use crate::camera::three_ray::multiplicity::{mixed_sign_range, quadratics};
+use crate::camera::three_ray::multiplicity::{Jacobian, mixed_sign_range};
 
 /// Images whose mirror points are nearer than this to a place, and whose λ is, are that place's.
 const HERE: f64 = 1e-6;
@@ -52,7 +52,7 @@ fn points_on_shared_edges_and_corners_are_counted_once() {
 
 /// λ and weights of points of the caustic in a camera: within, and on edge 1–2.
 pub(super) fn folds(camera: &Camera, random: &mut Random) -> Vec<(f64, [f64; 3])> {
-    let g = quadratics(&camera.rays);
+    let g = Jacobian::of(&camera.rays).g;
     let mut found = Vec::new();
     let Some((lo, hi)) = mixed_sign_range(&camera.rays, 1e-3, 8.0) else { return found };
     for _ in 0..4 {
