@@ -10,7 +10,7 @@ use eframe::egui::{self, TextureHandle, TextureOptions};
 use glam::DVec3;
 
 use super::gizmo::Handles;
-use super::settings::{Settings, Shown};
+use super::settings::{MirrorColors, Settings, Shown};
 use super::worker::{
     Event, LoadRequest, Map, Prepared, Probe, Probed, Save, Saved, Shot, Thing, View, What, Worker,
 };
@@ -50,6 +50,8 @@ pub(super) struct Display {
     pub(super) reports: Vec<FrameReport>,
     pub(super) errors: Option<(f64, Option<f64>, f64)>,
     pub(super) complete: bool,
+    /// Straight lines on the caustic surface, scene space.
+    pub(super) caustic: Vec<[glam::Vec3; 2]>,
 }
 
 /// The whole window.
@@ -322,14 +324,16 @@ impl Viewer {
             reports: shot.reports,
             errors: shot.errors,
             complete: shot.complete,
+            caustic: shot.caustic,
         });
     }
 
     fn probed(&mut self, probed: Probed) {
         if probed.probe.pick {
             self.selected = probed.thing;
-            if self.settings.inspect {
-                self.pinned = probed.reflected.is_some().then(|| probed.clone());
+            if self.settings.inspect || self.settings.paths {
+                let kept = probed.reflected.is_some() || probed.point.is_some();
+                self.pinned = kept.then(|| probed.clone());
             }
         }
         self.probed = Some(probed);
@@ -338,7 +342,7 @@ impl Viewer {
     /// Asks what is at a place of the canvas, as shares of its size.
     pub(super) fn ask(&mut self, at: egui::Vec2, pick: bool) {
         let at = glam::Vec2::new(at.x, at.y);
-        self.worker.probe(Probe { at, pick, trace: self.settings.inspect });
+        self.worker.probe(Probe { at, pick, trace: self.settings.inspect, paths: pick && self.settings.paths });
     }
 
     fn wanted(&self, rest: bool, scale: f64) -> View {
@@ -362,7 +366,11 @@ impl Viewer {
         let map = match (self.settings.compare, self.settings.shown) {
             (true, Shown::Difference) if rest => Map::Difference,
             (true, Shown::Flip) if rest => Map::Flip,
-            (false, _) if self.settings.costs && rest => Map::Cost,
+            (false, _) if rest => match self.settings.mirror {
+                MirrorColors::Reflection => Map::None,
+                MirrorColors::Cost => Map::Cost,
+                MirrorColors::Class => Map::Class,
+            },
             _ => Map::None,
         };
         View {
@@ -373,7 +381,8 @@ impl Viewer {
             placements: Arc::clone(&self.placements),
             rest,
             map,
-            planes: rest && self.settings.inspect,
+            planes: rest && (self.settings.inspect || self.settings.paths),
+            caustic: rest && self.settings.caustic,
         }
     }
 

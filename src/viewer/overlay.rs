@@ -1,9 +1,10 @@
 //! The camera under the pointer, or the one that was kept: its rays, the boxes it visited, its surfels.
 
 use eframe::egui::{self, Color32, Pos2, Rect, Stroke, vec2};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::app::Viewer;
+use super::worker::{Probed, SeenPath};
 use crate::analysis::{CameraTrace, Outcome};
 use crate::camera::Eye;
 
@@ -25,14 +26,8 @@ const EDGES: [(usize, usize); 12] = [
 ];
 
 pub(super) fn show(viewer: &Viewer, painter: &egui::Painter, rect: Rect) {
-    if !viewer.settings.inspect {
-        return;
-    }
+    let Some(prepared) = &viewer.prepared else { return };
     let probed = viewer.pinned.as_ref().or(viewer.probed.as_ref());
-    let (Some(trace), Some(prepared)) = (probed.and_then(|p| p.trace.as_ref()), &viewer.prepared)
-    else {
-        return;
-    };
     let eye = viewer.eye;
     let at = eye.position - prepared.origin;
     let Some(eye) = Eye::new(at, eye.target - prepared.origin, eye.up, eye.fov_y, viewer.size)
@@ -44,7 +39,60 @@ pub(super) fn show(viewer: &Viewer, painter: &egui::Painter, rect: Rect) {
         let px = eye.project_px(point)?;
         Some(rect.min + vec2(px.x, px.y) / size * rect.size())
     };
-    draw(trace, painter, &place);
+    if viewer.settings.caustic
+        && let Some(display) = &viewer.display
+    {
+        draw_caustic(&display.caustic, painter, &place);
+    }
+    if viewer.settings.paths
+        && let Some(Probed { point: Some(point), paths, .. }) = probed
+    {
+        let local = |p: DVec3| (p - prepared.origin).as_vec3();
+        draw_paths(local(*point), paths, local, painter, &place);
+    }
+    if viewer.settings.inspect
+        && let Some(trace) = probed.and_then(|p| p.trace.as_ref())
+    {
+        draw(trace, painter, &place);
+    }
+}
+
+/// Lines of the caustic surface that are drawn at most: more is a blur.
+const MOST_RULINGS: usize = 12_000;
+
+fn draw_caustic(
+    rulings: &[[Vec3; 2]],
+    painter: &egui::Painter,
+    place: &impl Fn(Vec3) -> Option<Pos2>,
+) {
+    let stroke = Stroke::new(1.0, Color32::from_rgba_unmultiplied(255, 190, 60, 90));
+    for [a, b] in rulings.iter().step_by(rulings.len().div_ceil(MOST_RULINGS).max(1)) {
+        if let (Some(a), Some(b)) = (place(*a), place(*b)) {
+            painter.line_segment([a, b], stroke);
+        }
+    }
+}
+
+/// From the point to each mirror point in which it is seen; hidden ways are faint.
+fn draw_paths(
+    point: Vec3,
+    paths: &[SeenPath],
+    local: impl Fn(DVec3) -> Vec3,
+    painter: &egui::Painter,
+    place: &impl Fn(Vec3) -> Option<Pos2>,
+) {
+    let Some(from) = place(point) else { return };
+    for path in paths {
+        let Some(to) = place(local(path.mirror_point)) else { continue };
+        let color = match (path.hidden, path.parity < 0) {
+            (true, _) => Color32::from_rgba_unmultiplied(200, 200, 200, 70),
+            (false, false) => Color32::from_rgb(90, 220, 255),
+            (false, true) => Color32::from_rgb(255, 150, 60),
+        };
+        painter.line_segment([from, to], Stroke::new(1.5, color));
+        painter.circle_filled(to, 3.0, color);
+    }
+    painter.circle_stroke(from, 5.0, Stroke::new(2.0, Color32::WHITE));
 }
 
 fn draw(trace: &CameraTrace, painter: &egui::Painter, place: &impl Fn(Vec3) -> Option<Pos2>) {

@@ -36,6 +36,17 @@ pub(super) enum Shown {
     Flip,
 }
 
+/// What the mirrors show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+pub(super) enum MirrorColors {
+    #[default]
+    Reflection,
+    /// What each triangle costs.
+    Cost,
+    /// How each triangle's rays run.
+    Class,
+}
+
 /// See the module.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(default)]
@@ -49,7 +60,11 @@ pub(super) struct Settings {
     pub(super) adapt: bool,
     pub(super) panel: bool,
     pub(super) inspect: bool,
-    pub(super) costs: bool,
+    pub(super) mirror: MirrorColors,
+    /// The surface on which the mirrors focus what the eye sees.
+    pub(super) caustic: bool,
+    /// All paths of the point that was clicked.
+    pub(super) paths: bool,
     pub(super) theme: Theme,
     pub(super) ui_scale: f32,
 }
@@ -65,7 +80,9 @@ impl Default for Settings {
             adapt: true,
             panel: true,
             inspect: false,
-            costs: false,
+            mirror: MirrorColors::default(),
+            caustic: false,
+            paths: false,
             theme: Theme::default(),
             ui_scale: 1.0,
         }

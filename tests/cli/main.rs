@@ -8,6 +8,7 @@ mod bad_options;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod interrupt;
+mod methods;
 mod paths;
 mod runs;
 mod same_bytes;

@@ -37,7 +37,7 @@ fn described(mirror: &str, triangles: usize, eye: DVec3) -> Scene {
             density: 1.0,
         }],
         environment: Environment::Constant(Vec3::ONE),
-        light: Light { to_sun: glam::Vec3::Y, sun: glam::Vec3::ONE, ambient: glam::Vec3::ONE },
+        light: Light { to_sun: Vec3::Y, sun: Vec3::ONE, ambient: Vec3::ONE },
     }
 }
 

@@ -3,22 +3,37 @@
 use eframe::egui;
 
 use super::super::app::Viewer;
-use super::super::worker::{Probed, Thing};
+use super::super::settings::MirrorColors;
+use super::super::worker::{Probed, SeenPath, Thing};
 use crate::scene::description::Scene;
+
+/// Paths that are listed.
+const MOST_ROWS: usize = 12;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
     ui.checkbox(&mut viewer.settings.inspect, "What is under the pointer");
-    ui.checkbox(&mut viewer.settings.costs, "Mirror coloured by cost")
-        .on_hover_text("projections a pixel, of each triangle: black none, white most");
-    if !viewer.settings.inspect {
+    ui.checkbox(&mut viewer.settings.paths, "All paths of the point that is clicked")
+        .on_hover_text("everywhere that mirrors show it: on objects and on their reflections");
+    ui.checkbox(&mut viewer.settings.caustic, "Caustic surface")
+        .on_hover_text("where neighbouring reflected rays meet, and points gain or lose images");
+    ui.horizontal_wrapped(|ui| {
+        ui.label("mirror shows");
+        for (colors, word, about) in MIRRORS {
+            ui.selectable_value(&mut viewer.settings.mirror, colors, word).on_hover_text(about);
+        }
+    });
+    if !viewer.settings.inspect && !viewer.settings.paths {
         return;
     }
-    ui.weak("Click on a mirror to keep its camera; Esc lets it go.");
+    ui.weak("Click to keep what is there; Esc lets it go.");
     let Some(scene) = viewer.scene.clone() else { return };
     let pinned = viewer.pinned.is_some();
     let Some(probed) = viewer.pinned.as_ref().or(viewer.probed.as_ref()) else { return };
     if pinned {
         ui.strong("kept");
+    }
+    if !viewer.settings.inspect && probed.paths.is_empty() {
+        return;
     }
     egui::Grid::new("probe").num_columns(2).striped(true).show(ui, |ui| {
         for (name, value) in rows(probed, &scene) {
@@ -28,6 +43,20 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
         }
     });
 }
+
+const MIRRORS: [(MirrorColors, &str, &str); 3] = [
+    (MirrorColors::Reflection, "its reflection", "what it reflects"),
+    (
+        MirrorColors::Cost,
+        "cost",
+        "projections a pixel, of each triangle: black none, white most",
+    ),
+    (
+        MirrorColors::Class,
+        "camera class",
+        "how a triangle's rays run: blue only apart; green together, then apart; orange: they cross, so that a point may have several images",
+    ),
+];
 
 fn rows(probed: &Probed, scene: &Scene) -> Vec<(&'static str, String)> {
     let name = match probed.thing {
@@ -50,6 +79,18 @@ fn rows(probed: &Probed, scene: &Scene) -> Vec<(&'static str, String)> {
             ("coverage", mirror.coverage.map(|c| format!("{c:.2}"))),
         ];
         rows.extend(numbers.into_iter().filter_map(|(name, value)| Some((name, value?))));
+    }
+    if probed.probe.paths {
+        let hidden = probed.paths.iter().filter(|path| path.hidden).count();
+        rows.push(("paths", format!("{}, {hidden} of them hidden", probed.paths.len())));
+        for path in probed.paths.iter().take(MOST_ROWS) {
+            let mirror = scene.mirrors.get(path.mirror).map_or("mirror", |m| m.name.as_str());
+            let turned = if path.parity < 0 { ", mirrored twice" } else { "" };
+            let near = if path.near_caustic { ", near the caustic" } else { "" };
+            let hidden = if path.hidden { ", hidden" } else { "" };
+            let SeenPath { triangle, length, .. } = path;
+            rows.push(("", format!("{mirror} {triangle}: {length:.3}{turned}{near}{hidden}")));
+        }
     }
     if let Some(trace) = &probed.trace {
         let sum = |of: fn(&crate::analysis::CloudTrace) -> usize| -> usize {

@@ -3,6 +3,7 @@
 use eframe::egui::{Key, Modifiers, PointerButton};
 use egui_kittest::kittest::Queryable;
 
+use super::super::settings::MirrorColors;
 use super::super::worker::{Saved, Thing};
 use super::*;
 use crate::scene::file;
@@ -293,4 +294,51 @@ fn a_pixel_of_the_mirror_tells_what_it_shows() {
     assert!(shown.lambda.expect("known") > 0.0 && shown.surfel.is_some());
     let trace = kept.trace.expect("c3rc has cameras");
     assert!(trace.clouds.iter().any(|c| c.surfels.iter().any(|s| s.valid)));
+}
+
+#[test]
+fn classes_caustics_and_all_paths_are_shown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("bowl.toml");
+    let bowl = SCENE.replacen("shape = \"sphere\"", "shape = \"bowl\"", 1);
+    std::fs::write(&path, bowl).expect("it is written");
+    let settings = Settings {
+        paths: true,
+        caustic: true,
+        mirror: MirrorColors::Class,
+        ..without_panel()
+    };
+    let mut hands = opened(&path, [400.0, 300.0], settings);
+    hands.step();
+    until_drawn(&mut hands);
+    until(&mut hands, "classes", |v| v.display.as_ref().is_some_and(|d| d.map.is_some()));
+    let rulings = viewer(&hands).display.as_ref().map_or(0, |d| d.caustic.len());
+    assert!(rulings > 100, "a hollow mirror focuses: {rulings}");
+    // On the ground, and on what the bowl shows.
+    let mut counted = Vec::new();
+    for (x, y) in [(0.2, 0.9), (0.5, 0.55)] {
+        viewer_mut(&mut hands).pinned = None;
+        let at = on_canvas(&hands, x, y);
+        click(&mut hands, at);
+        until(&mut hands, "a kept point", |v| v.pinned.is_some());
+        let kept = viewer(&hands).pinned.clone().expect("it is there");
+        let eye = viewer(&hands).eye.position;
+        let point = kept.point.expect("something is seen there");
+        for path in &kept.paths {
+            let [a, b] = [path.mirror_point.distance(eye), path.mirror_point.distance(point)];
+            assert!((a + b - path.length).abs() < 1e-6 * path.length, "{path:?}");
+        }
+        let seen = kept.paths.iter().filter(|path| !path.hidden).count();
+        counted.push((kept.thing, kept.paths.len(), seen));
+        hands.key_press(Key::Escape);
+        hands.step();
+    }
+    assert_eq!(counted[0].0, Some(Thing::Object(1)), "the ground itself");
+    assert!(counted.iter().any(|&(_, _, seen)| seen > 0), "{counted:?}");
+    viewer_mut(&mut hands).settings.mirror = MirrorColors::Reflection;
+    viewer_mut(&mut hands).settings.caustic = false;
+    hands.step();
+    until(&mut hands, "the reflection again", |v| {
+        v.display.as_ref().is_some_and(|d| d.map.is_none() && d.caustic.is_empty())
+    });
 }

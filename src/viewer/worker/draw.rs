@@ -24,6 +24,8 @@ use crate::image::color::linear_to_srgb8;
 use crate::image::compare::{self, Comparison, Set};
 use crate::image::io::write_picture;
 use crate::methods::{Method, method};
+use crate::paths::PathScene;
+use crate::scene::description::Scene;
 use crate::scene::prepared::{PreparedScene, milliseconds};
 
 /// Everything that the thread owns.
@@ -43,6 +45,10 @@ struct Stage {
     placements: Arc<Vec<Similarity>>,
     /// Where things were when the light was computed.
     lit: Arc<Vec<Similarity>>,
+    /// As it was read.
+    source: Arc<Scene>,
+    /// For paths, with things in these places.
+    paths: Option<(Arc<Vec<Similarity>>, PathScene)>,
     /// Places that are being shaded, and what cancels that.
     shading: Option<(Arc<Vec<Similarity>>, Arc<AtomicBool>)>,
 }
@@ -142,6 +148,8 @@ impl Artist {
             prepared: prepared.clone(),
             lit: Arc::clone(&placements),
             placements,
+            source: Arc::clone(&source),
+            paths: None,
             shading: None,
         });
         self.last = None;
@@ -180,6 +188,7 @@ impl Artist {
             pictures: Vec::new(),
             reports: Vec::new(),
             map: None,
+            caustic: Vec::new(),
             errors: None,
             complete: stage.prepared.complete,
             view: Arc::clone(&view),
@@ -210,7 +219,14 @@ impl Artist {
                 let visibility = self.renderers[first].2.visibility();
                 shot.map = probe::costs(&stage.scene, &eye, visibility, &view.sides[0])?;
             }
+            (Map::Class, &[first, ..]) => {
+                let visibility = self.renderers[first].2.visibility();
+                shot.map = Some(probe::classes(&stage.scene, &eye, visibility, &view.sides[0]));
+            }
             _ => {}
+        }
+        if view.caustic {
+            shot.caustic = probe::caustic(&stage.scene, &eye, &view.sides[0]);
         }
         if view.rest {
             stage.light(&self.shared);
@@ -222,12 +238,19 @@ impl Artist {
     }
 
     fn probe(&mut self, asked: &probe::Probe) -> Result<probe::Probed> {
-        let (Some(stage), Some(view)) = (&self.scene, &self.last) else {
+        let (Some(stage), Some(view)) = (&mut self.scene, &self.last) else {
             return Err(Error::Cancelled);
         };
         let at = renderer_for(&mut self.renderers, 0, &view.sides[0])?;
         let eye = view_eye(&stage.scene, view)?;
-        probe::probe(&stage.scene, &eye, view, &self.renderers[at].2, asked)
+        let renderer = &self.renderers[at].2;
+        let mut found = probe::probe(&stage.scene, &eye, view, renderer, asked)?;
+        if asked.paths
+            && let Some(point) = found.point
+        {
+            found.paths = probe::paths(stage.path_scene(), view, point)?;
+        }
+        Ok(found)
     }
 
     /// Draws it anew, to its end: the picture of a file is no preview.
@@ -270,6 +293,23 @@ enum Work {
 }
 
 impl Stage {
+    /// What paths run between, with things where they are now.
+    fn path_scene(&mut self) -> &PathScene {
+        let here = Arc::clone(&self.placements);
+        if self.paths.as_ref().is_some_and(|(places, _)| *places != here) {
+            self.paths = None;
+        }
+        let source = &self.source;
+        let make = || {
+            let mut scene = Scene::clone(source);
+            let objects = scene.objects.iter_mut().map(|o| &mut o.transform);
+            let all = objects.chain(scene.mirrors.iter_mut().map(|m| &mut m.transform));
+            all.zip(here.iter()).for_each(|(transform, place)| *transform = *place);
+            (Arc::clone(&here), PathScene::new(&scene))
+        };
+        &self.paths.get_or_insert_with(make).1
+    }
+
     /// Puts things where the wish has them; no tree is built.
     fn place(&mut self, placements: &Arc<Vec<Similarity>>) {
         if Arc::ptr_eq(placements, &self.placements)

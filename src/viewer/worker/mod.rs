@@ -12,10 +12,10 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
 use eframe::egui::ColorImage;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 pub(super) use load::{LoadRequest, What};
-pub(super) use probe::{Probe, Probed, Thing};
+pub(super) use probe::{Probe, Probed, SeenPath, Thing};
 
 use crate::camera::eye::ImageSize;
 use crate::frame::FrameReport;
@@ -69,6 +69,8 @@ pub(super) enum Map {
     Flip,
     /// The mirror coloured by what its triangles cost.
     Cost,
+    /// The mirror coloured by how its triangles' rays run.
+    Class,
 }
 
 /// What is to be seen.
@@ -86,6 +88,8 @@ pub(super) struct View {
     pub(super) map: Map,
     /// What every pixel shows is wanted too.
     pub(super) planes: bool,
+    /// The caustic surface is wanted too.
+    pub(super) caustic: bool,
 }
 
 /// What was drawn.
@@ -95,6 +99,8 @@ pub(super) struct Shot {
     pub(super) pictures: Vec<ColorImage>,
     pub(super) reports: Vec<FrameReport>,
     pub(super) map: Option<ColorImage>,
+    /// Straight lines on the caustic surface, scene space.
+    pub(super) caustic: Vec<[Vec3; 2]>,
     /// RMSE, PSNR (dB, none if equal) and mean FLIP of the two sides.
     pub(super) errors: Option<(f64, Option<f64>, f64)>,
     /// Of the scene's last load, everything is there.

@@ -5,11 +5,16 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::View;
 use super::{Side, draw::heat};
+use crate::analysis::multiplicity::{MirrorCameras, class_color};
 use crate::analysis::{CameraTrace, trace_camera, triangle_costs};
-use crate::camera::Eye;
+use crate::camera::{Eye, RayScale};
+use crate::context::Context;
 use crate::error::Result;
 use crate::frame::Renderer;
 use crate::image::NONE;
+use crate::image::color::linear_to_srgb8;
+use crate::methods::{Value, ray_scale};
+use crate::paths::{Path, PathFinder, PathOptions, PathScene};
 use crate::scene::prepared::PreparedScene;
 use crate::visibility::{NONE_ID, RayWeights, Visibility};
 
@@ -22,6 +27,8 @@ pub(crate) struct Probe {
     pub(crate) pick: bool,
     /// The camera that draws it is wanted too.
     pub(crate) trace: bool,
+    /// All paths of the point that is seen there are wanted too.
+    pub(crate) paths: bool,
 }
 
 /// Something in the scene.
@@ -57,6 +64,23 @@ pub(crate) struct Reflected {
     pub(crate) coverage: Option<f32>,
 }
 
+/// A way of light from the eye over a mirror to a point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SeenPath {
+    /// Index of the mirror, and of the triangle in it.
+    pub(crate) mirror: usize,
+    pub(crate) triangle: u32,
+    /// Where it meets the mirror, world space.
+    pub(crate) mirror_point: DVec3,
+    /// From the eye to the point, world units.
+    pub(crate) length: f64,
+    /// See [`crate::paths::Path::parity`].
+    pub(crate) parity: i8,
+    pub(crate) near_caustic: bool,
+    /// Something is in the way.
+    pub(crate) hidden: bool,
+}
+
 /// The answer.
 #[derive(Clone, Debug)]
 pub(crate) struct Probed {
@@ -65,6 +89,10 @@ pub(crate) struct Probed {
     pub(crate) thing: Option<Thing>,
     pub(crate) reflected: Option<Reflected>,
     pub(crate) trace: Option<CameraTrace>,
+    /// What is seen there, directly or reflected, world space; `None` for the sky.
+    pub(crate) point: Option<DVec3>,
+    /// Of that point, if they were asked for.
+    pub(crate) paths: Vec<SeenPath>,
 }
 
 /// Answers it for the picture that `renderer` drew last.
@@ -76,7 +104,14 @@ pub(super) fn probe(
     asked: &Probe,
 ) -> Result<Probed> {
     let visibility = renderer.visibility();
-    let mut found = Probed { probe: *asked, thing: None, reflected: None, trace: None };
+    let mut found = Probed {
+        probe: *asked,
+        thing: None,
+        reflected: None,
+        trace: None,
+        point: None,
+        paths: Vec::new(),
+    };
     let size = visibility.size;
     if size != eye.size || !(0.0..1.0).contains(&asked.at.x) || !(0.0..1.0).contains(&asked.at.y) {
         return Ok(found);
@@ -88,12 +123,13 @@ pub(super) fn probe(
     found.thing = visibility.locate(visibility.samples[at][0]).map(|(surface, _)| {
         if surface < mirrors { Thing::Mirror(surface) } else { Thing::Object(surface - mirrors) }
     });
+    let px = Vec2::new(pixel[0] as f32, pixel[1] as f32) + 0.5;
     let id = visibility.mirror_ids[at];
     if id == NONE_ID {
+        found.point = seen_point(scene, eye, visibility, at, px);
         return Ok(found);
     }
     let (_, triangle) = scene.mirror_of(id);
-    let px = Vec2::new(pixel[0] as f32, pixel[1] as f32) + 0.5;
     let corners = scene.mirror_triangle(id).corners;
     let weights = RayWeights::new(eye, corners).at(px.as_dvec2()).unwrap_or_default();
     let mut seen = Reflected { triangle, weights, ..Reflected::default() };
@@ -108,11 +144,78 @@ pub(super) fn probe(
             seen.position = Some(Vec3::from(planes.position[at]).as_dvec3());
         }
     }
+    found.point = seen.position;
     found.reflected = Some(seen);
     if asked.trace && view.sides[0].method == "c3rc" {
         found.trace = trace_camera(scene, eye, visibility, &view.sides[0].params, pixel)?;
     }
     Ok(found)
+}
+
+/// The point of an object that is seen directly at a pixel's centre, world space.
+fn seen_point(
+    scene: &PreparedScene,
+    eye: &Eye,
+    visibility: &Visibility,
+    at: usize,
+    px: Vec2,
+) -> Option<DVec3> {
+    let (surface, triangle) = visibility.locate(visibility.samples[at][0])?;
+    let object = &scene.objects[surface.checked_sub(visibility.mirrors())?];
+    let corners = object.mesh.triangles()[triangle].map(|i| object.positions[i as usize]);
+    let [a, b, c] = RayWeights::new(eye, corners).at(px.as_dvec2())?;
+    let point = corners[0] * a + corners[1] * b + corners[2] * c;
+    Some(point.as_dvec3() + scene.origin)
+}
+
+/// All ways of light from the eye of a view to a point (world space).
+pub(super) fn paths(scene: &PathScene, view: &View, point: DVec3) -> Result<Vec<SeenPath>> {
+    let ray_scale = scale_of(&view.sides[0]);
+    let options = PathOptions { ray_scale, ..PathOptions::default() };
+    let finder = PathFinder::new(scene, view.eye.position, options)?;
+    let seen = |path: &Path| SeenPath {
+        mirror: path.mirror as usize,
+        triangle: path.triangle,
+        mirror_point: path.mirror_point,
+        length: path.length,
+        parity: path.parity(),
+        near_caustic: path.near_caustic(),
+        hidden: path.is_occluded(),
+    };
+    Ok(finder.find(&[point], &Context::default())?.of(0).iter().map(seen).collect())
+}
+
+/// The rays of a side's cameras; of other methods those of the standard.
+fn scale_of(side: &Side) -> RayScale {
+    match side.params.get("ray-scale") {
+        Some(Value::Choice(word)) => ray_scale(word),
+        _ => RayScale::default(),
+    }
+}
+
+/// The mirrors coloured by how the rays of each triangle's camera run.
+pub(super) fn classes(
+    scene: &PreparedScene,
+    eye: &Eye,
+    visibility: &Visibility,
+    side: &Side,
+) -> ColorImage {
+    let classes = MirrorCameras::new(scene, eye.position, scale_of(side)).classes();
+    let color = |&id: &u32| match id {
+        NONE_ID => Color32::TRANSPARENT,
+        id => {
+            let [r, g, b] = class_color(classes[id as usize]).map(linear_to_srgb8);
+            Color32::from_rgb(r, g, b)
+        }
+    };
+    let size = [visibility.size.width as usize, visibility.size.height as usize];
+    ColorImage::new(size, visibility.mirror_ids.iter().map(color).collect())
+}
+
+/// Straight lines on the caustic surface of all mirrors, scene space.
+pub(super) fn caustic(scene: &PreparedScene, eye: &Eye, side: &Side) -> Vec<[Vec3; 2]> {
+    let surface = MirrorCameras::new(scene, eye.position, scale_of(side)).caustic();
+    surface.strips.into_iter().flat_map(|strip| strip.rulings).collect()
 }
 
 /// The mirrors coloured by the projections that each of their triangles takes in a frame, a pixel that it covers:

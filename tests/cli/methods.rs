@@ -1,0 +1,116 @@
+//! The methods beside c3rc, and the bench of all of them.
+
+use super::{Folder, SMALL, png_size};
+
+const BALL: &str = "--mirror sphere --object knot";
+
+#[test]
+fn searches_and_maps_draw_what_they_can() {
+    let folder = Folder::new();
+    for method in ["estalella", "roger-holzschuch", "environment"] {
+        let run = folder.good(&format!("render {BALL} {SMALL} --method {method} --json f.json"));
+        assert!(run.out.contains(method), "{}", run.out);
+        let figures = folder.json("f.json");
+        assert_eq!(figures["method"], method);
+        assert!(figures["covered_pixels"].as_u64().unwrap() > 50, "{method}");
+        assert!(figures["ms"]["layer"].as_f64().unwrap() > 0.0);
+        assert_eq!(png_size(&folder.read("catoptric.png")), [160, 90]);
+    }
+    let run = folder.good(&format!("render {SMALL} --method estalella --json f.json"));
+    let notes = folder.json("f.json")["notes"].clone();
+    assert_eq!(notes[0], "teapot rim is not star-shaped: it shows the environment only");
+    assert!(run.out.contains("note: teapot handle is not star-shaped"), "{}", run.out);
+    folder.good(&format!(
+        "render {BALL} {SMALL} --method roger-holzschuch --primitive points --point square1 \
+         --iterations 6 --early-exit off --map-side 64 --map-triangles 9000"
+    ));
+    folder.good(&format!(
+        "render {BALL} {SMALL} --method estalella --grid 0.1 --epsilon 1e-6 --tessellate 4"
+    ));
+}
+
+#[test]
+fn what_they_cannot_is_refused_with_its_reason() {
+    let folder = Folder::new();
+    for method in ["estalella", "roger-holzschuch"] {
+        folder.refused(
+            &format!("render --mirror torus --object knot {SMALL} --method {method}"),
+            &["mirror torus: is not star-shaped", "--proxy", "--method c3rc"],
+        );
+    }
+    folder.good(&format!(
+        "render --mirror torus --object knot {SMALL} --method estalella --proxy ellipsoid"
+    ));
+    let small = |rest: &str| format!("render {BALL} {SMALL} {rest}");
+    for (line, expected) in [
+        (small("--proxy pot"), "--proxy: there is no built-in shape \"pot\""),
+        (small("--proxy none.obj"), "none.obj"),
+        (small("--proxy sphere --proxy cube"), "--proxy: there are more of them than mirrors (1)"),
+        (small("--method estalella --grid 2"), "--grid: \"2\" is not a number from 0 to 1"),
+        (small("--method estalella --grid nan"), "--grid: \"nan\" is not a number"),
+        (small("--method estalella --iterations 0"), "--iterations: \"0\" is not a whole number"),
+        (small("--method roger-holzschuch --map-side 4"), "--map-side: \"4\" is not"),
+        (small("--method environment --cube-side 1000000"), "--cube-side: \"1000000\" is not"),
+        (small("--method environment --grid 0.5"), "--grid"),
+    ] {
+        folder.refused(&line, &[expected]);
+    }
+}
+
+#[test]
+fn scene_files_name_stand_ins() {
+    let folder = Folder::new();
+    let scene = |proxy: &str| {
+        format!(
+            "[eye]\nposition = [0, 1, 4]\ntarget = [0, 0, 0]\n[[mirror]]\nshape = \"torus\"\n{proxy}\n\
+             [[object]]\nshape = \"cube\"\ntranslate = [0, 0, 2]\nscale = 0.5\n"
+        )
+    };
+    folder.write("with.toml", scene("proxy = \"sphere\"")).write("without.toml", scene(""));
+    folder.write("wrong.toml", scene("proxy = \"pot\""));
+    folder.good(&format!("render with.toml {SMALL} --method roger-holzschuch"));
+    let line = |name: &str| format!("render {name} {SMALL} --method roger-holzschuch");
+    folder.refused(&line("without.toml"), &["mirror torus: is not star-shaped"]);
+    folder.refused(&line("wrong.toml"), &["wrong.toml: line 4: ", "there is no built-in shape"]);
+}
+
+#[test]
+fn all_methods_are_compared() {
+    let folder = Folder::new();
+    let run = folder.good(&format!(
+        "bench methods {BALL} {SMALL} --spp 4 --repeat 1 --frames 3 --backend cpu -o found --json all.json"
+    ));
+    assert!(run.out.contains("| roger-holzschuch | cpu |"), "{}", run.out);
+    let all = folder.json("all.json");
+    let methods = all["methods"].as_array().unwrap();
+    let ids: Vec<&str> = methods.iter().map(|m| m["method"].as_str().unwrap()).collect();
+    assert_eq!(ids, ["c3rc", "raytrace", "estalella", "roger-holzschuch", "environment"]);
+    for method in methods {
+        for key in ["rmse", "flip", "missing", "flicker"] {
+            assert!(method[key].as_f64().is_some(), "{key} of {method}");
+        }
+        assert!(method["ms"]["reflection"].as_f64().unwrap() > 0.0);
+        assert!(method["displacement_px"]["median"].as_f64().is_some(), "{method}");
+        assert!(!method["settings"].as_array().unwrap().is_empty(), "{method}");
+    }
+    // Rays show what is there; a map from the centre does not.
+    let px = |i: usize| methods[i]["displacement_px"]["median"].as_f64().unwrap();
+    assert!(px(1) < 0.1 && px(4) > 10.0 * px(0), "{} {} {}", px(0), px(1), px(4));
+    for name in ["sheet.png", "reference.png", "c3rc.png", "environment.png"] {
+        assert!(png_size(&folder.read(&format!("found/{name}"))).iter().all(|&side| side > 50));
+    }
+    let table = String::from_utf8(folder.read("found/methods.md")).unwrap();
+    assert!(table.contains("| c3rc | cpu |") && table.contains("displacement px"));
+    let plot = String::from_utf8(folder.read("found/error-against-time.svg")).unwrap();
+    assert!(plot.contains("estalella, iterations") && plot.trim_end().ends_with("</svg>"));
+    assert_eq!(folder.json("found/methods.json"), all);
+    folder.write("taken", "a file");
+    folder.refused(
+        &format!("bench methods {BALL} {SMALL} -o taken"),
+        &["taken: is a file, and a folder is written; "],
+    );
+    folder.refused(
+        &format!("bench methods --mirror sphere --object cube {SMALL} --eye 0,50,0 --target 0,100,1 -o new"),
+        &["the view: shows no mirror that reflects an object; "],
+    );
+}
