@@ -101,6 +101,20 @@ impl Camera {
         e(1).cross(e(2))
     }
 
+    /// A camera of no mirror, whose rays all leave its front.
+    #[cfg(test)]
+    pub(super) fn alone(rays: Rays) -> Self {
+        Self {
+            mirror: 0,
+            triangle: 0,
+            rays,
+            three_ray: ThreeRay::new(&rays, &rays),
+            facing: [1.0; 3],
+            eye_distance: [0.0; 3],
+            size: 1.0,
+        }
+    }
+
     /// Whether the ray at `w` leaves the front of the smooth surface.
     #[cfg(test)]
     pub(super) fn faces(&self, w: [f64; 3]) -> bool {
