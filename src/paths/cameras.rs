@@ -42,7 +42,7 @@ pub(super) fn cameras(scene: &PathScene, eye: DVec3, scale: RayScale) -> Vec<Cam
         for (triangle, t) in (0..).zip(0..count) {
             let (origins, normals) = (surface.corners(t), surface.corner_normals(t));
             let facing = [0, 1, 2].map(|i| normals[i].dot(eye - origins[i]));
-            if facing.iter().all(|f| !(*f > 0.0)) {
+            if !facing.iter().any(|f| *f > 0.0) {
                 continue;
             }
             let directions = [0, 1, 2].map(|i| {
@@ -85,7 +85,8 @@ impl Camera {
         let weights = [image.b1(), image.b2, image.b3];
         let sum = |values: [f64; 3]| (0..3).map(|i| weights[i] * values[i]).sum::<f64>();
         let inside = image.found && weights.iter().all(|w| *w >= -TIE);
-        if !(inside && sum(self.facing) > 0.0) {
+        let in_front = sum(self.facing) > 0.0;
+        if !(inside && in_front) {
             return None;
         }
         let (_, d) = self.rays.at(DVec3::from_array(weights));
