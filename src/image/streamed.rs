@@ -5,7 +5,7 @@ use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::io::{output_error, plain, replaceable, write_aside};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// Bytes given to the system at once.
 const BUFFER: usize = 1 << 20;
@@ -48,11 +48,6 @@ impl StreamedFile {
             Ok(())
         };
         place().map_err(|error: std::io::Error| output_error(&self.path, plain(&error)))
-    }
-
-    /// What a failed write means to the user.
-    pub fn failed(&self, error: &std::io::Error) -> Error {
-        output_error(&self.path, plain(error))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Completeness, ties, folds, exact reflections, occlusion and refinement.
 
+mod completeness;
 mod folds;
 mod legs;
 mod smooth;
