@@ -14,6 +14,7 @@ struct Result {
     point: vec3<f32>,
     normal: vec3<f32>,
     steps: u32,
+    hidden: bool,
 }
 
 @group(0) @binding(0) var<uniform> task: Task;
@@ -28,7 +29,7 @@ fn point_at(i: u32) -> vec3<f32> {
 
 fn store(i: u32, r: Result) {
     found[2u * i] = vec4(r.point, f32(r.steps));
-    found[2u * i + 1u] = vec4(r.normal, 0.0);
+    found[2u * i + 1u] = vec4(r.normal, select(0.0, 1.0, r.hidden));
 }
 
 @compute @workgroup_size(64)
@@ -49,7 +50,9 @@ fn search_roger(
 ) {
     let i = (group.y * GROUPS + group.x) * 64u + lane;
     if i < task.count {
-        store(i, find_roger(point_at(i)));
+        var found_here = find_roger(point_at(i));
+        found_here.hidden = hides(point_at(i));
+        store(i, found_here);
     }
 }
 

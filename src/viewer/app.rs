@@ -342,7 +342,12 @@ impl Viewer {
     /// Asks what is at a place of the canvas, as shares of its size.
     pub(super) fn ask(&mut self, at: egui::Vec2, pick: bool) {
         let at = glam::Vec2::new(at.x, at.y);
-        self.worker.probe(Probe { at, pick, trace: self.settings.inspect, paths: pick && self.settings.paths });
+        self.worker.probe(Probe {
+            at,
+            pick,
+            trace: self.settings.inspect,
+            paths: pick && self.settings.paths,
+        });
     }
 
     fn wanted(&self, rest: bool, scale: f64) -> View {

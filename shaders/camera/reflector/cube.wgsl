@@ -89,3 +89,39 @@ fn foot_direction(direction: vec3<f32>) -> vec3<f32> {
     }
     return direction;
 }
+
+/// How far outside the surface a point is, as a share of the radius.
+fn outside(p: vec3<f32>) -> f32 {
+    return length(p) / radial_at(p).w - 1.0;
+}
+
+/// Whether a point is in the hidden region.
+fn hides(point: vec3<f32>) -> bool {
+    var least = outside(point);
+    if task.inward != 0u {
+        return least > 0.0;
+    }
+    let sight = point - task.eye;
+    var at = 1.0;
+    for (var k = 1u; k < SIGHT_SAMPLES; k += 1u) {
+        let t = f32(k) / f32(SIGHT_SAMPLES);
+        let now = outside(task.eye + sight * t);
+        if now < least {
+            least = now;
+            at = t;
+        }
+    }
+    var step = 0.5 / f32(SIGHT_SAMPLES);
+    for (var k = 0u; k < SIGHT_HALVINGS; k += 1u) {
+        for (var side = -1.0; side < 2.0; side += 2.0) {
+            let t = at + side * step;
+            let now = outside(task.eye + sight * clamp(t, 0.0, 1.0));
+            if now < least {
+                least = now;
+                at = t;
+            }
+        }
+        step *= 0.5;
+    }
+    return least < 0.0;
+}

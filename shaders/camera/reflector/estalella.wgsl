@@ -90,16 +90,9 @@ fn by_bisector(vertex: vec3<f32>, hidden: bool) -> Result {
             best = at;
         }
     }
-    return Result(best.point, best.normal, steps);
+    return Result(best.point, best.normal, steps, hidden);
 }
 
 fn find_estalella(vertex: vec3<f32>) -> Result {
-    let found = by_bisector(vertex, false);
-    let at = Surface(found.point, found.normal);
-    if height_over(at, vertex) > 0.0 && height_over(at, task.eye) > 0.0 {
-        return found;
-    }
-    var hidden = by_bisector(vertex, true);
-    hidden.steps += found.steps;
-    return hidden;
+    return by_bisector(vertex, hides(vertex));
 }

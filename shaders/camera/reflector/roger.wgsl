@@ -52,7 +52,7 @@ fn result_of(s: Sample, steps: u32) -> Result {
     if task.inward != 0u {
         outward = -outward;
     }
-    return Result(s.point, unit_or(outward, s.direction), steps);
+    return Result(s.point, unit_or(outward, s.direction), steps, false);
 }
 
 fn find_roger(vertex: vec3<f32>) -> Result {

@@ -112,9 +112,10 @@ impl Searcher {
             self.run(gpu, pipeline, &task, &[(1, radial), (2, surface)], 2)?;
             let bytes = points.len() as u64 * 32;
             gpu.read::<[[f32; 4]; 2], _>(self.out.buffer(), bytes, |rows| {
-                list.extend(rows.iter().map(|&[[x, y, z, steps], [a, b, c, _]]| Found {
+                list.extend(rows.iter().map(|&[[x, y, z, steps], [a, b, c, hidden]]| Found {
                     point: Vec3::new(x, y, z),
                     normal: Vec3::new(a, b, c),
+                    hidden: hidden != 0.0,
                     #[expect(
                         clippy::cast_possible_truncation,
                         clippy::cast_sign_loss,

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::records::{LAYOUT, NO_OWNER};
 use super::surfaces::{PAINTS, SURFACE_ROWS};
 use crate::backend::cpu::splat::{EDGE_TOLERANCE, blend, projection};
-use crate::camera::reflector::{estalella, roger};
+use crate::camera::reflector::{self, estalella, roger};
 use crate::camera::three_ray::solve::MAX_STEPS;
 use crate::geometry::lanes::Scalar;
 use crate::plan::{CELL_SLACK_PX, LARGEST_ELLIPSE, SplatShape};
@@ -128,7 +128,15 @@ pub(super) fn close() -> String {
 
 /// Searches on reflectors, and cube maps read.
 pub(super) fn search() -> String {
-    let mut text = format!("const GROUPS: u32 = {GROUPS}u;\n");
+    let mut text = String::new();
+    let words = [
+        ("GROUPS", GROUPS),
+        ("SIGHT_SAMPLES", reflector::SIGHT_SAMPLES),
+        ("SIGHT_HALVINGS", reflector::SIGHT_HALVINGS),
+    ];
+    for (name, value) in words {
+        writeln!(text, "const {name}: u32 = {value}u;").expect("strings grow");
+    }
     let numbers = [
         ("MOST_STEP", estalella::MOST_STEP),
         ("STEP_SHARE_LEAST", estalella::STEP_SHARE[0]),

@@ -45,7 +45,7 @@ fn bisector(
     direction: Vec3,
 ) -> Bisector {
     let (point, normal) = map.surface_at(direction);
-    let found = Found { point, normal, steps: 0 };
+    let found = Found { point, normal, steps: 0, hidden };
     let vertex = if hidden { found.mirrored(vertex) } else { vertex };
     let (to_eye, to_vertex) = (unit(eye - point), unit(vertex - point));
     let b = (to_eye + to_vertex).normalize_or(normal);
@@ -96,7 +96,7 @@ pub fn search(map: &ReflectorMap, eye: Vec3, vertex: Vec3, hidden: bool, ends: E
             best = at;
         }
     }
-    Found { point: best.point, normal: best.normal, steps }
+    Found { point: best.point, normal: best.normal, steps, hidden }
 }
 
 /// Between the feet of eye and vertex on the reflector, nearer to that of the nearer one: as in a plane mirror close by,

@@ -36,6 +36,8 @@ pub struct Found {
     pub normal: Vec3,
     /// Steps that the search took.
     pub steps: u32,
+    /// The reflector hides the point that was searched for: see [`ReflectorMap::hides`].
+    pub hidden: bool,
 }
 
 impl Found {
@@ -72,6 +74,35 @@ impl ReflectorMap {
         }
     }
 
+    /// Whether a point is in the hidden region (Estalella et al. section 6.1): the reflector is between it and the eye, or it is
+    /// beyond the reflector's surface. Of a hollow mirror, whose opening the map does not know, only the latter counts.
+    pub fn hides(&self, eye: Vec3, point: Vec3) -> bool {
+        // How far outside the surface, as a share of the radius.
+        let outside = |p: Vec3| p.length() / self.radius(p) - 1.0;
+        let here = outside(point);
+        if self.inward {
+            return here > 0.0;
+        }
+        let along = |t: f32| outside(eye + (point - eye) * t);
+        let (mut least, mut at) = (here, 1.0);
+        for k in 1..SIGHT_SAMPLES {
+            let t = k as f32 / SIGHT_SAMPLES as f32;
+            let now = along(t);
+            (least, at) = if now < least { (now, t) } else { (least, at) };
+        }
+        // Around the lowest of them, where it may be lower still.
+        let mut step = 0.5 / SIGHT_SAMPLES as f32;
+        for _ in 0..SIGHT_HALVINGS {
+            for side in [-1.0, 1.0] {
+                let t = at + side * step;
+                let now = along(t.clamp(0.0, 1.0));
+                (least, at) = if now < least { (now, t) } else { (least, at) };
+            }
+            step *= 0.5;
+        }
+        least < 0.0
+    }
+
     /// The radius in a direction of any length.
     pub fn radius(&self, direction: Vec3) -> f32 {
         self.radial.at(direction)[3]
@@ -92,6 +123,11 @@ impl ReflectorMap {
         if behind { -direction } else { direction }
     }
 }
+
+/// Places along a line of sight that are looked at first, and how often the step around the lowest is halved: together to a
+/// thousandth of its length.
+pub(crate) const SIGHT_SAMPLES: u32 = 8;
+pub(crate) const SIGHT_HALVINGS: u32 = 6;
 
 /// Normals further than this from the radius (its cosine) have no gradient that f32 could hold.
 const LEAST_SLOPE: f32 = 0.02;

@@ -190,5 +190,10 @@ fn limited(target: Vec3, nearest: &Sample, shortest: bool, trust: f32) -> Vec3 {
 fn found(map: &ReflectorMap, sample: &Sample, steps: u32) -> Found {
     let outward = sample.point - sample.slope;
     let normal = if map.inward { -outward } else { outward };
-    Found { point: sample.point, normal: normal.normalize_or(sample.direction), steps }
+    Found {
+        point: sample.point,
+        normal: normal.normalize_or(sample.direction),
+        steps,
+        hidden: false,
+    }
 }

@@ -202,3 +202,30 @@ fn hidden_vertices_mirror_reflected_ones() {
     }
     assert!(missed * 50 < cases.len(), "{missed} of {}", cases.len());
 }
+
+#[test]
+fn what_is_behind_is_hidden() {
+    let (map, hollow) = (map(ELLIPSOID, false), map(Surface::Sphere { inside: true }, true));
+    let mut numbers = Numbers(21);
+    let (mut hidden, mut wrong) = (0, 0);
+    for _ in 0..20_000 {
+        let eye = numbers.point().normalize_or(DVec3::Z) * numbers.between(2.0, 6.0);
+        let point = numbers.point() * 3.0;
+        // The line of sight in the space in which the ellipsoid is the unit sphere.
+        let axes = DVec3::new(1.0, 0.6, 1.5);
+        let (a, b) = (eye / axes, point / axes);
+        let t = (a.dot(a - b) / (a - b).length_squared()).clamp(0.0, 1.0);
+        let nearest = a.lerp(b, t).length();
+        // Nearer than this to grazing the texels decide.
+        if (nearest - 1.0).abs() > 5e-3 {
+            let truth = nearest < 1.0;
+            hidden += usize::from(truth);
+            wrong += usize::from(map.hides(eye.as_vec3(), point.as_vec3()) != truth);
+        }
+        let inside = point.length() < 0.999;
+        if inside || point.length() > 1.001 {
+            assert_eq!(hollow.hides(eye.as_vec3(), point.as_vec3()), !inside, "{point}");
+        }
+    }
+    assert!(hidden > 2_000 && wrong == 0, "{wrong} wrong, {hidden} hidden");
+}

@@ -24,6 +24,9 @@ const ROUNDS: usize = 6;
 /// teapot's lid, whose neck hides it from below, is.
 const LEAST_COSINE: f64 = 0.05;
 
+/// See [`center`].
+const HOLLOW_MARGIN: f64 = 0.1;
+
 /// A triangle's plane and its farthest corner decide.
 struct Face {
     normal: DVec3,
@@ -45,10 +48,10 @@ pub(super) fn center(triangles: &[[Vec3; 3]]) -> Option<Center> {
         return None;
     }
     let bounds = Aabb::of(triangles.iter().flatten().copied());
-    let best = [false, true].map(|inward| sided(&faces, bounds, inward));
-    best.into_iter()
-        .max_by(|a, b| a.cosine.total_cmp(&b.cosine))
-        .filter(|c| c.cosine > LEAST_COSINE)
+    let [out, within] = [false, true].map(|inward| sided(&faces, bounds, inward));
+    // A flat mirror is seen as well from before as from behind: only a hollow one is better seen from before.
+    let best = if within.cosine > out.cosine + HOLLOW_MARGIN { within } else { out };
+    (best.cosine > LEAST_COSINE).then_some(best)
 }
 
 /// The best centre for one side.

@@ -46,11 +46,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
 
 const MIRRORS: [(MirrorColors, &str, &str); 3] = [
     (MirrorColors::Reflection, "its reflection", "what it reflects"),
-    (
-        MirrorColors::Cost,
-        "cost",
-        "projections a pixel, of each triangle: black none, white most",
-    ),
+    (MirrorColors::Cost, "cost", "projections a pixel, of each triangle: black none, white most"),
     (
         MirrorColors::Class,
         "camera class",

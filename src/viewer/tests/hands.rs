@@ -302,12 +302,8 @@ fn classes_caustics_and_all_paths_are_shown() {
     let path = folder.path().join("bowl.toml");
     let bowl = SCENE.replacen("shape = \"sphere\"", "shape = \"bowl\"", 1);
     std::fs::write(&path, bowl).expect("it is written");
-    let settings = Settings {
-        paths: true,
-        caustic: true,
-        mirror: MirrorColors::Class,
-        ..without_panel()
-    };
+    let settings =
+        Settings { paths: true, caustic: true, mirror: MirrorColors::Class, ..without_panel() };
     let mut hands = opened(&path, [400.0, 300.0], settings);
     hands.step();
     until_drawn(&mut hands);

@@ -50,9 +50,8 @@ impl Place {
     fn image(&self, point: Vec3, found: &Found) -> Image {
         let scale = self.to_scene.scale as f32;
         let place = if self.is_virtual { found.mirrored(point) } else { found.point };
-        // Where the eye is behind the reflector, nothing is reflected.
-        let height = found.height(point);
-        let height = if found.height(self.eye) > 0.0 { height } else { -height.abs() };
+        let height = found.height(point).abs();
+        let height = if found.hidden { -height } else { height };
         Image {
             place: self.scene(place),
             height: height * scale,
@@ -119,7 +118,7 @@ impl<'a> Reflecting<'a> {
             let rays = self.rays_about(found);
             let length = rays.directions[0].length().max(f64::MIN_POSITIVE);
             let lambda = f64::from(point.distance(found.point)) / length;
-            (found.height(point) > 0.0).then_some((rays, lambda))
+            (!found.hidden).then_some((rays, lambda))
         };
         let found = self.find(points)?;
         Ok(points.iter().zip(&found).filter_map(path).collect())

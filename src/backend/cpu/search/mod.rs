@@ -62,18 +62,14 @@ pub(crate) fn by_cpu(job: &Job<'_>) -> Result<Vec<Found>> {
     /// Points a task: untuned.
     const CHUNK: usize = 256;
     let map = &job.part.map;
-    let find = |&point: &Vec3| match job.search {
-        Search::Estalella(ends) => {
-            let found = estalella::search(map, job.eye, point, false, ends);
-            if found.height(point) > 0.0 && found.height(job.eye) > 0.0 {
-                return found;
+    let find = |&point: &Vec3| {
+        let hidden = map.hides(job.eye, point);
+        match job.search {
+            Search::Estalella(ends) => estalella::search(map, job.eye, point, hidden, ends),
+            Search::Roger { iterations, px } => {
+                let ends = roger::Ends { iterations, angle: px * job.px };
+                Found { hidden, ..roger::search(map, job.eye, point, ends) }
             }
-            let hidden = estalella::search(map, job.eye, point, true, ends);
-            Found { steps: found.steps + hidden.steps, ..hidden }
-        }
-        Search::Roger { iterations, px } => {
-            let ends = roger::Ends { iterations, angle: px * job.px };
-            roger::search(map, job.eye, point, ends)
         }
     };
     Ok(job.points.par_iter().with_min_len(CHUNK).map(find).collect())

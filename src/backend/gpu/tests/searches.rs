@@ -19,10 +19,10 @@ use crate::plan::search::{ReflectorPart, Search};
 const ESTALELLA: Search = Search::Estalella(estalella::Ends { iterations: 9, epsilon: 0.0 });
 const ROGER: Search = Search::Roger { iterations: 20, px: 0.01 };
 const EYES: [DVec3; 4] = [
-    DVec3::new(0.0, 0.3, 3.0),
-    DVec3::new(4.0, -1.0, 0.5),
+    DVec3::new(0.0, 0.3, 5.0),
+    DVec3::new(5.0, -1.0, 0.5),
     DVec3::new(-1.0, 5.0, -2.0),
-    DVec3::new(-2.0, -2.0, -1.0),
+    DVec3::new(-3.0, -2.0, -1.0),
 ];
 
 /// A surface with its map, and cases of each eye.
@@ -63,8 +63,10 @@ fn agrees(gpu: &Device, trial: &Trial, search: Search) -> Result<(), String> {
         errors.extend(cases.iter().zip(&on_device).map(|(case, found)| px(found, case.exact)));
         for (a, b) in on_device.iter().zip(&on_cpu) {
             let normals = a.normal.distance(b.normal) < 1e-2;
-            let steps = a.steps.abs_diff(b.steps) <= 6;
-            let close = px(a, b.point.as_dvec3()) < 0.1 && normals && steps;
+            // A bisector that rounds to the normal ends a search early.
+            let steps = a.steps.abs_diff(b.steps) <= 6 || search == ESTALELLA;
+            let alike = normals && steps && a.hidden == b.hidden;
+            let close = px(a, b.point.as_dvec3()) < 0.1 && alike;
             apart += usize::from(!close);
             total += 1;
         }
@@ -93,7 +95,7 @@ fn the_device_finds_the_exact_points() {
 }
 
 /// What is replaced, by what, and in which search it shows.
-const MUTANTS: [(&str, &str, Search); 16] = [
+const MUTANTS: [(&str, &str, Search); 18] = [
     ("row = task.side + 2u;", "row = task.side + 1u;", ROGER),
     ("face = select(2u, 3u,", "face = select(3u, 2u,", ROGER),
     ("* 0.5 * side + 0.5", "* 0.5 * side", ROGER),
@@ -114,6 +116,8 @@ const MUTANTS: [(&str, &str, Search); 16] = [
     ("let beta = (ab * ac - aa * bc)", "let beta = (ab * ac + aa * bc)", ROGER),
     ("outward = s.point - s.slope", "outward = s.point", ROGER),
     ("found[2u * i + 1u]", "found[2u * i]", ROGER),
+    ("least < 0.0;", "least > 0.0;", ROGER),
+    ("length(p) / radial_at(p).w - 1.0", "length(p) / radial_at(p).w", ROGER),
 ];
 
 #[test]
