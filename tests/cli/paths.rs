@@ -90,8 +90,10 @@ fn all_formats_hold_the_same_and_so_does_any_number_of_threads() {
     folder.good(&format!("{line} -o out.csv --json a.json"));
     let (_, rows) = table(&folder, "out.csv");
     let bytes = 20 * 8 + 3 * 4 + 6;
-    let (count, npy) = packed(&folder_with(&folder, line, "out.npy"), "out.npy", bytes);
-    let (vertices, ply) = packed(&folder_with(&folder, line, "out.ply"), "out.ply", bytes);
+    folder.good(&format!("{line} -o out.npy"));
+    folder.good(&format!("{line} -o out.ply"));
+    let (count, npy) = packed(&folder, "out.npy", bytes);
+    let (vertices, ply) = packed(&folder, "out.ply", bytes);
     assert!(count > 40_000 && count == rows.len() && count == vertices);
     assert_eq!(npy, ply);
     let double = |at: usize| f64::from_le_bytes(npy[at..at + 8].try_into().unwrap());
@@ -128,11 +130,6 @@ fn all_formats_hold_the_same_and_so_does_any_number_of_threads() {
         assert_eq!(folder.json("c.json")["points"], a["images"], "{name}");
     }
     assert!(a["hidden_by_object"].as_u64() > Some(0), "{a}");
-}
-
-fn folder_with<'a>(folder: &'a Folder, line: &str, name: &str) -> &'a Folder {
-    folder.good(&format!("{line} -o {name}"));
-    folder
 }
 
 #[test]
