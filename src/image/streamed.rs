@@ -21,7 +21,7 @@ impl StreamedFile {
     /// Begins a file that will be at `path`.
     ///
     /// # Errors
-    /// [`Error::Output`] with what the system said.
+    /// [`Error::Output`](crate::Error::Output) with what the system said.
     pub fn create(path: &Path) -> Result<Self> {
         let aside =
             if replaceable(path) { write_aside(path) } else { tempfile::NamedTempFile::new() };
@@ -32,7 +32,7 @@ impl StreamedFile {
     /// Puts the file into its place.
     ///
     /// # Errors
-    /// [`Error::Output`] with what the system said.
+    /// [`Error::Output`](crate::Error::Output) with what the system said.
     pub fn finish(mut self) -> Result<()> {
         let place = || {
             self.aside.flush()?;
