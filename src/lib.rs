@@ -92,6 +92,8 @@
 //! - **Patch**: a visible mirror triangle, or a part of a large one; or a **cell**: pixels of a 32 × 32 tile whose exact
 //!   rays are nearly linear over the picture, across triangles. **Batch**: a contiguous range of surfels
 //!   that a camera has to project. **Image**: a place where a camera sees a surfel; there may be three.
+//! - **Path**: a way of light from the eye over a mirror point to a point. **Ghost**: where a range sensor at the eye would see the point
+//!   by it: straight on behind the mirror point, as far as the path is long.
 //! - **Layer**: the reflection before environment and direct view, and what it costs: patches, cameras,
 //!   clearing, culling, projection, splatting, resolve.
 //!

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::io::{output_error, plain, replaceable, write_aside};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// Bytes given to the system at once.
 const BUFFER: usize = 1 << 20;
@@ -21,7 +21,7 @@ impl StreamedFile {
     /// Begins a file that will be at `path`.
     ///
     /// # Errors
-    /// [`Error::Output`] with what the system said.
+    /// [`Error::Output`](crate::Error::Output) with what the system said.
     pub fn create(path: &Path) -> Result<Self> {
         let aside =
             if replaceable(path) { write_aside(path) } else { tempfile::NamedTempFile::new() };
@@ -32,7 +32,7 @@ impl StreamedFile {
     /// Puts the file into its place.
     ///
     /// # Errors
-    /// [`Error::Output`] with what the system said.
+    /// [`Error::Output`](crate::Error::Output) with what the system said.
     pub fn finish(mut self) -> Result<()> {
         let place = || {
             self.aside.flush()?;
@@ -48,11 +48,6 @@ impl StreamedFile {
             Ok(())
         };
         place().map_err(|error: std::io::Error| output_error(&self.path, plain(&error)))
-    }
-
-    /// What a failed write means to the user.
-    pub fn failed(&self, error: &std::io::Error) -> Error {
-        output_error(&self.path, plain(error))
     }
 }
 

@@ -42,7 +42,7 @@ pub(super) fn cameras(scene: &PathScene, eye: DVec3, scale: RayScale) -> Vec<Cam
         for (triangle, t) in (0..).zip(0..count) {
             let (origins, normals) = (surface.corners(t), surface.corner_normals(t));
             let facing = [0, 1, 2].map(|i| normals[i].dot(eye - origins[i]));
-            if facing.iter().all(|f| !(*f > 0.0)) {
+            if !facing.iter().any(|f| *f > 0.0) {
                 continue;
             }
             let directions = [0, 1, 2].map(|i| {
@@ -85,7 +85,8 @@ impl Camera {
         let weights = [image.b1(), image.b2, image.b3];
         let sum = |values: [f64; 3]| (0..3).map(|i| weights[i] * values[i]).sum::<f64>();
         let inside = image.found && weights.iter().all(|w| *w >= -TIE);
-        if !(inside && sum(self.facing) > 0.0) {
+        let in_front = sum(self.facing) > 0.0;
+        if !(inside && in_front) {
             return None;
         }
         let (_, d) = self.rays.at(DVec3::from_array(weights));
@@ -99,6 +100,20 @@ impl Camera {
         let [v, d] = [self.rays.origins, self.rays.directions];
         let e = |i: usize| v[i] - v[0] + (d[i] - d[0]) * lambda;
         e(1).cross(e(2))
+    }
+
+    /// A camera of no mirror, whose rays all leave its front.
+    #[cfg(test)]
+    pub(super) fn alone(rays: Rays) -> Self {
+        Self {
+            mirror: 0,
+            triangle: 0,
+            rays,
+            three_ray: ThreeRay::new(&rays, &rays),
+            facing: [1.0; 3],
+            eye_distance: [0.0; 3],
+            size: 1.0,
+        }
     }
 
     /// Whether the ray at `w` leaves the front of the smooth surface.

@@ -113,6 +113,9 @@ impl<'a> PathFinder<'a> {
     ///
     /// # Errors
     /// [`Error::Cancelled`].
+    ///
+    /// # Panics
+    /// If there are 2³² points or more.
     pub fn find(&self, points: &[DVec3], cx: &Context) -> Result<PathSet> {
         let groups = self.groups(points, cx, |group, images| {
             let mut ends = vec![0; group.len()];
@@ -146,6 +149,9 @@ impl<'a> PathFinder<'a> {
     ///
     /// # Errors
     /// [`Error::Cancelled`].
+    ///
+    /// # Panics
+    /// If there are 2³² points or more.
     pub fn count(&self, points: &[DVec3], cx: &Context) -> Result<Vec<ImageCount>> {
         let groups = self.groups(points, cx, |group, images| {
             let mut counts = vec![ImageCount::default(); group.len()];

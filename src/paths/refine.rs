@@ -85,7 +85,8 @@ fn on_surface(
         )?;
         let step = s * step[0] + t * step[1] + sink;
         p += step;
-        if !(p.distance(start) <= 2.0 * REACH * size) {
+        let near = p.distance(start) <= 2.0 * REACH * size;
+        if !near {
             return None;
         }
         if step.length() <= CONVERGED * size {

@@ -61,7 +61,8 @@ impl Noise {
     fn new(camera: &ThreeRay<f64>, q: [f64; 3]) -> Self {
         let length = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
         let n = [camera.n0, camera.n1, camera.n2].map(length);
-        Self { n, q: length(q), d: length(camera.d1) }
+        // The point itself was rounded, and so was the corner, relative to the scene's origin.
+        Self { n, q: length(q) + length(camera.v1), d: length(camera.d1) }
     }
 
     fn at(&self, lambda: f64) -> f64 {

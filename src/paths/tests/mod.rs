@@ -1,5 +1,6 @@
 //! Completeness, ties, folds, exact reflections, occlusion and refinement.
 
+mod completeness;
 mod folds;
 mod legs;
 mod smooth;
@@ -165,7 +166,7 @@ fn every_path_is_a_ray_of_its_camera() {
             let det = slopes[0].cross(slopes[1]).dot(slopes[2]);
             let size = slopes.map(DVec3::length).iter().product::<f64>();
             assert!((det - path.det_j).abs() < 1e-7 * size, "{det} {}", path.det_j);
-            assert_eq!(path.parity(), path.det_j.signum() as i8);
+            assert_eq!(f64::from(path.parity()), path.det_j.signum());
         }
     }
     assert!(seen[0] > 1_000 && seen[1] > 300, "{seen:?}");

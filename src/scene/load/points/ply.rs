@@ -34,21 +34,21 @@ impl Vertices {
             encoding: header.encoding,
             parser: Parser::new(),
         };
+        // Without properties they take no space, however many there are.
+        let count = |e: &ElementDef| if e.properties.is_empty() { 0 } else { e.count as u64 };
+        if let Some(e) = header.elements.values().find(|e| count(e) > input.total_bytes) {
+            let problem = format!(
+                "promises {} elements \"{}\", but has only {} bytes",
+                e.count, e.name, input.total_bytes
+            );
+            return Err(input.error("", problem, GET_IT_AGAIN));
+        }
         for element in header.elements.values() {
-            // Without properties they take no space, however many there are.
-            let count = if element.properties.is_empty() { 0 } else { element.count as u64 };
-            if count > input.total_bytes {
-                let problem = format!(
-                    "promises {count} elements \"{}\", but has only {} bytes",
-                    element.name, input.total_bytes
-                );
-                return Err(input.error("", problem, GET_IT_AGAIN));
-            }
             if element.name == "vertex" {
                 vertices.vertex = element.clone();
                 break;
             }
-            for index in 0..count {
+            for index in 0..count(element) {
                 read(input, &vertices.parser, vertices.encoding, element, index)?;
             }
         }

@@ -109,7 +109,7 @@ fn what_is_no_file_of_points_is_refused() {
         ("a.obj", b"v 1 2\n", "line 1: has fewer than three numbers"),
         ("a.stl", b"solid", "convert it: .ply, .obj, .xyz, .csv, .txt, .npy are supported"),
         ("a.ply", b"1 2 3\n", "does not say \"ply\""),
-        ("a.ply", &ply("ascii", 3, b"1 0\n2 0\n1 2 3\n"), "line 14: has fewer numbers"),
+        ("a.ply", &ply("ascii", 3, b"1 0\n2 0\n1 2 3\n"), "line 16: has fewer numbers"),
         ("a.ply", &ply("ascii", 9_999, b""), "promises 9999 elements \"vertex\""),
         ("a.npy", b"no array at all", "is no array of NumPy"),
         ("a.npy", b"\x93NUMPY\x02\x00\xff\xff\xff\xff", "has a header of 4294967295 bytes"),
