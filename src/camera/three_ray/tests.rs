@@ -30,6 +30,12 @@ impl Numbers {
         lo + (hi - lo) * self.next()
     }
 
+    /// One of these.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the length")]
+    pub(crate) fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
+        list[(self.next() * list.len() as f64) as usize]
+    }
+
     pub(crate) fn point(&mut self) -> DVec3 {
         DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
     }

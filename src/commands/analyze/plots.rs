@@ -31,6 +31,7 @@ pub(super) fn histogram(sets: &[(&str, &ImageHistogram)]) -> anyhow::Result<Stri
         chart
             .configure_mesh()
             .disable_x_mesh()
+            .max_light_lines(1)
             .x_desc("images")
             .y_desc("% of the points")
             .x_labels(columns.min(24))

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::super::search::Searcher;
+use super::super::search::{Searcher, Task};
 use super::super::shaders;
 use super::{Device, device};
 use crate::backend::cpu::lookup::{self, Asked};
@@ -158,5 +158,22 @@ fn the_device_reads_cube_maps() {
     assert_eq!(read.len(), exact.len());
     for (a, b) in read.iter().zip(&exact) {
         assert!((0..4).all(|k| (a[k] - b[k]).abs() < 1e-5), "{a:?} instead of {b:?}");
+    }
+}
+
+#[test]
+fn the_task_is_the_shaders() {
+    let module = naga::front::wgsl::parse_str(&shaders::search()).expect("it is valid");
+    let task = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("Task"));
+    let naga::TypeInner::Struct { members, span } = &task.expect("it is there").1.inner else {
+        panic!("Task is a structure")
+    };
+    macro_rules! fields {
+        ($($name:ident),*) => { [$((stringify!($name), std::mem::offset_of!(Task, $name))),*] };
+    }
+    let own = fields!(eye, side, inward, iterations, count, limit);
+    assert_eq!((*span as usize, members.len()), (size_of::<Task>(), own.len()));
+    for (member, (name, offset)) in members.iter().zip(own) {
+        assert_eq!((member.name.as_deref(), member.offset as usize), (Some(name), offset));
     }
 }

@@ -106,8 +106,8 @@ fn off_surface(rays: &Rays, point: DVec3, guess: f64, pair: &[Ruling]) -> f64 {
 #[test]
 fn strips_lie_on_sampled_folds() {
     let results = tasks(600, 4, |numbers| {
-        let shape = [Shape::Convex, Shape::Concave, Shape::Saddle][(numbers.next() * 3.0) as usize];
-        let kh = KH[(numbers.next() * 4.0) as usize];
+        let shape = numbers.one_of(&[Shape::Convex, Shape::Concave, Shape::Saddle]);
+        let kh = numbers.one_of(&KH);
         let scale = if numbers.next() < 0.5 { RayScale::EyeDistance } else { RayScale::Unit };
         let rays = camera(numbers, shape, kh, scale);
         hausdorff(&rays, largest_lambda(&rays, 8.0))

@@ -132,9 +132,9 @@ fn projectors_count_as_subdivision_does() {
     let cameras = if long() { 520_000 } else { 6_000 };
     let tally = tasks(cameras, 1, |numbers| {
         let mut tally = Tally::default();
-        let shape = SHAPES[(numbers.next() * 4.0) as usize];
-        let kh = KH[(numbers.next() * 4.0) as usize];
-        let law = LAWS[(numbers.next() * 3.0) as usize];
+        let shape = numbers.one_of(&SHAPES);
+        let kh = numbers.one_of(&KH);
+        let law = numbers.one_of(&LAWS);
         let scale = if numbers.next() < 0.5 { RayScale::EyeDistance } else { RayScale::Unit };
         let rays = camera(numbers, shape, kh, scale);
         let most = largest_lambda(&rays, law);

@@ -136,7 +136,9 @@ impl Search<'_> {
         let beyond = EDGE * (self.hi - self.lo);
         let at_bound = (lambda - self.lo).abs() <= beyond || (lambda - self.hi).abs() <= beyond;
         let at_edge = w.abs().min_element() <= EDGE;
-        if !(w.min_element() < -EDGE) && (at_bound || at_edge || !(sine.abs() >= GRAZING)) {
+        // What is not a number is not decided.
+        let (outside, steep) = (w.min_element() < -EDGE, sine.abs() >= GRAZING);
+        if !outside && (at_bound || at_edge || !steep) {
             self.found.decided = false;
         }
         self.found.roots.push(Root { lambda, w, sine });

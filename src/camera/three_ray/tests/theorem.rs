@@ -16,9 +16,9 @@ const POINTS: usize = 100;
 fn a_root_outside_the_mixed_intervals_is_the_only_image() {
     let cameras = if long() { 1_200_000 } else { 12_000 };
     let results = tasks(cameras, 3, |numbers| {
-        let shape = SHAPES[(numbers.next() * 4.0) as usize];
-        let kh = KH[(numbers.next() * 4.0) as usize];
-        let law = LAWS[(numbers.next() * 3.0) as usize];
+        let shape = numbers.one_of(&SHAPES);
+        let kh = numbers.one_of(&KH);
+        let law = numbers.one_of(&LAWS);
         let scale = if numbers.next() < 0.5 { RayScale::EyeDistance } else { RayScale::Unit };
         let rays = camera(numbers, shape, kh, scale);
         let most = largest_lambda(&rays, law);
