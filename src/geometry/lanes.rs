@@ -22,6 +22,8 @@ pub trait Scalar:
     /// Square root of the precision: the error of one more step of a method that converges quadratically is below
     /// the precision when its last step was below this.
     const ROOT_EPSILON: f64;
+    /// Largest relative error of a rounding.
+    const ROUNDING: f64;
     /// Steps after which bisection alone ends at the precision, or nearly so.
     const ROOT_STEPS: usize;
     /// Rounds to this type.
@@ -32,6 +34,7 @@ pub trait Scalar:
 
 impl Scalar for f32 {
     const ROOT_EPSILON: f64 = 1.0 / (1 << 12) as f64;
+    const ROUNDING: f64 = 0.5 * Self::EPSILON as f64;
     const ROOT_STEPS: usize = 24;
     #[expect(clippy::cast_possible_truncation, reason = "the one rounding")]
     fn from_f64(value: f64) -> Self {
@@ -44,6 +47,7 @@ impl Scalar for f32 {
 
 impl Scalar for f64 {
     const ROOT_EPSILON: f64 = 1.0 / (1 << 26) as f64;
+    const ROUNDING: f64 = 0.5 * Self::EPSILON;
     const ROOT_STEPS: usize = 56;
     fn from_f64(value: f64) -> Self {
         value

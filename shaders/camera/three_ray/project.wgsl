@@ -25,6 +25,20 @@ fn cubic(camera: u32, q: vec3<f32>) -> vec4<f32> {
     return vec4(dot(q, n0.xyz), dot(q, n1.xyz) - n0.w, dot(q, n2.xyz) - n1.w, -n2.w);
 }
 
+fn size_of(v: vec3<f32>) -> f32 {
+    return abs(v.x) + abs(v.y) + abs(v.z);
+}
+
+/// What rounding may add to the cubic of `q` at λ.
+fn noise(camera: u32, q: vec3<f32>, lambda: f32) -> f32 {
+    let n0 = size_of(row(camera + N0).xyz);
+    let n1 = size_of(row(camera + N1).xyz);
+    let n2 = size_of(row(camera + N2).xyz);
+    let normal = lambda * (lambda * n2 + n1) + n0;
+    let reach = size_of(q) + abs(lambda) * size_of(row(camera + D1).xyz);
+    return normal * reach * NOISE;
+}
+
 /// Narrows λ to where v1 + `q` can have an image in the grown camera.
 fn bracket(camera: u32, q: vec3<f32>, lambda: vec2<f32>) -> vec2<f32> {
     let axis = row(camera + AXIS);
@@ -67,7 +81,18 @@ fn images_of(camera: u32, q: vec3<f32>, lambda: vec2<f32>) -> Images {
 
 /// The image whose λ lies in one of the pieces.
 fn project(camera: u32, images: Images, piece: u32) -> Image {
-    let root = root_in_piece(images.cubic, images.pieces, piece);
+    var root = root_in_piece(images.cubic, images.pieces, piece);
+    if !root.found && images.pieces.count > 1u {
+        let p = images.pieces.ends.y;
+        let q = images.pieces.ends.z;
+        let noise_at = vec2(noise(camera, images.q, p), noise(camera, images.q, q));
+        let double = touches(images.cubic, images.pieces, noise_at);
+        if double.x && piece < 2u {
+            root = Root(p, true);
+        } else if double.y && piece > 0u {
+            root = Root(q, true);
+        }
+    }
     if !root.found {
         return Image(root.lambda, 0.0, 0.0, false);
     }

@@ -39,14 +39,22 @@ struct Root {
     found: bool,
 }
 
+/// Whether the cubic, monotone in `lo..=hi`, has a root there.
+fn crosses(c: vec4<f32>, lo: f32, hi: f32, closed: bool) -> bool {
+    let f_lo = value(c, lo);
+    let f_hi = value(c, hi);
+    let rising = f_lo < 0.0 && 0.0 <= f_hi;
+    let falling = 0.0 < f_lo && f_hi <= 0.0;
+    return (rising || falling || (closed && f_lo == 0.0)) && lo <= hi;
+}
+
 /// The root in `lo..=hi`, where the cubic must be monotone. One at `lo` counts only if `closed`.
 fn monotone_root(c: vec4<f32>, lo: f32, hi: f32, closed: bool) -> Root {
     let f_lo = value(c, lo);
     let f_hi = value(c, hi);
     let rising = f_lo < 0.0 && 0.0 <= f_hi;
     let falling = 0.0 < f_lo && f_hi <= 0.0;
-    let found = (rising || falling || (closed && f_lo == 0.0)) && lo <= hi;
-    if !found {
+    if !crosses(c, lo, hi, closed) {
         return Root(lo, false);
     }
     var a = lo;
@@ -93,6 +101,19 @@ fn pieces_between(c: vec4<f32>, lo: f32, hi: f32) -> Pieces {
         return Pieces(vec4(lo, hi, hi, hi), 1u);
     }
     return Pieces(vec4(lo, critical_points(c, lo, hi), hi), 3u);
+}
+
+/// The points where the cubic turns round nearer to zero than rounding tells, without a root beside it: double roots.
+fn touches(c: vec4<f32>, pieces: Pieces, noise: vec2<f32>) -> vec2<bool> {
+    let lo = pieces.ends.x;
+    let p = pieces.ends.y;
+    let q = pieces.ends.z;
+    let hi = pieces.ends.w;
+    let middle = crosses(c, p, q, false);
+    let at_p = lo < p && p < hi && !crosses(c, lo, p, true) && !middle && abs(value(c, p)) <= noise.x;
+    let at_q = lo < q && q < hi && !(middle || at_p) && !crosses(c, q, hi, false)
+        && abs(value(c, q)) <= noise.y;
+    return vec2(at_p, at_q);
 }
 
 /// The root in one of the pieces, which are in rising order.

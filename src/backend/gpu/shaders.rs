@@ -6,6 +6,7 @@ use super::records::{LAYOUT, NO_OWNER};
 use super::surfaces::{PAINTS, SURFACE_ROWS};
 use crate::backend::cpu::splat::{EDGE_TOLERANCE, blend, projection};
 use crate::camera::reflector::{self, estalella, roger};
+use crate::camera::three_ray::project::NOISE_ROUNDINGS;
 use crate::camera::three_ray::solve::MAX_STEPS;
 use crate::geometry::lanes::Scalar;
 use crate::plan::{CELL_SLACK_PX, LARGEST_ELLIPSE, SplatShape};
@@ -68,9 +69,11 @@ fn constants(shape: SplatShape) -> String {
     word("NO_OWNER", NO_OWNER);
     word("MAX_STEPS", u32::try_from(MAX_STEPS).expect("few"));
     #[expect(clippy::cast_possible_truncation, reason = "a power of two")]
-    let epsilon = <f32 as Scalar>::ROOT_EPSILON as f32;
+    let [epsilon, noise] = [<f32 as Scalar>::ROOT_EPSILON, NOISE_ROUNDINGS * f32::ROUNDING]
+        .map(|number| number as f32);
     let numbers = [
         ("ROOT_EPSILON", epsilon),
+        ("NOISE", noise),
         ("REACH", shape.reach()),
         ("EDGE_TOLERANCE", EDGE_TOLERANCE),
         ("LARGEST_ELLIPSE", LARGEST_ELLIPSE),

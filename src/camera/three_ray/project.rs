@@ -41,6 +41,9 @@ impl<R: Real> Image<R> {
     }
 }
 
+/// Roundings in the largest terms of F. Those of its constants alone are one each.
+pub(crate) const NOISE_ROUNDINGS: f64 = 2.0;
+
 impl<T: Scalar> ThreeRay<T> {
     /// The cubic F(λ) whose roots are the parameters at which T(λ)'s plane contains v1 + `q`.
     #[inline(always)]
@@ -53,6 +56,19 @@ impl<T: Scalar> ThreeRay<T> {
                 q[0].splat(-self.nd[2]),
             ],
         }
+    }
+
+    /// What the rounding of the constants and of F's evaluation may add to F(λ) of `q`: a double root is on a caustic, where
+    /// that decides whether there are two images or none.
+    #[inline(always)]
+    fn noise<R: Real<Scalar = T>>(&self, q: [R; 3], lambda: R) -> R {
+        let size = |v: [T; 3]| {
+            let v = v.map(|x| x.to_f64().abs());
+            T::from_f64(v[0] + v[1] + v[2])
+        };
+        let normal = lambda * (lambda * size(self.n2) + size(self.n1)) + size(self.n0);
+        let reach = q[0].abs() + q[1].abs() + q[2].abs() + lambda.abs() * size(self.d1);
+        normal * reach * T::from_f64(NOISE_ROUNDINGS * T::ROUNDING)
     }
 
     /// Narrows `lo..hi` to where v1 + `q` can have an image in the grown triangle.
@@ -121,7 +137,7 @@ impl<R: Real> Images<R> {
 #[inline(always)]
 pub fn project<R: Real>(camera: &ThreeRay<R::Scalar>, q: [R; 3], lo: R, hi: R) -> Images<R> {
     let (lo, hi) = camera.bracket(q, lo, hi);
-    let roots = camera.cubic(q).roots_between(lo, hi);
+    let roots = camera.cubic(q).roots_between(lo, hi, |lambda| camera.noise(q, lambda));
     let (lambda, found) = roots.root[0];
     let mut image = [camera.image_at(q, lambda, found); 3];
     if roots.count > 1 {

@@ -100,18 +100,30 @@ impl<R: Real> Cubic<R> {
 
     /// The real roots in `lo..=hi`, in rising order within a lane: one if F is monotone there in all lanes,
     /// else three. A lane has those that its mask says.
+    ///
+    /// `noise` says what rounding may add to F(λ): where F turns round nearer to zero than that without reaching it, it has a
+    /// double root, since the true one may well have two.
     #[inline(always)]
-    pub fn roots_between(&self, lo: R, hi: R) -> Roots<R> {
+    pub fn roots_between(&self, lo: R, hi: R, noise: impl Fn(R) -> R) -> Roots<R> {
         if !R::any(self.bends(lo, hi)) {
             let root = self.monotone_root(lo, hi, true);
             return Roots { root: [root; 3], count: 1 };
         }
         let [p, q] = self.critical_points(lo, hi);
-        let root = [
+        let mut root = [
             self.monotone_root(lo, p, true),
             self.monotone_root(p, q, false),
             self.monotone_root(q, hi, false),
         ];
+        for (k, turn) in [p, q].into_iter().enumerate() {
+            let alone = !(root[k].1 | root[k + 1].1) & lo.lt(turn) & turn.lt(hi);
+            if R::any(alone) {
+                let touches = alone & self.value(turn).abs().le(noise(turn));
+                for root in &mut root[k..k + 2] {
+                    *root = (R::select(touches, turn, root.0), root.1 | touches);
+                }
+            }
+        }
         Roots { root, count: 3 }
     }
 }

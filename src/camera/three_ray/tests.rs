@@ -479,7 +479,7 @@ fn roots_agree_with_brent() {
         let q = (v + d * lambda - rays.origins[0]).to_array();
         let cubic = camera.cubic::<f64>(q);
         let (lo, hi) = (0.0, 8.0);
-        let found = cubic.roots_between(lo, hi);
+        let found = cubic.roots_between(lo, hi, |_| 0.0);
         let found: Vec<f64> =
             found.root[..found.count].iter().filter(|r| r.1).map(|r| r.0).collect();
         let [p, q] = cubic.critical_points(lo, hi);
