@@ -16,7 +16,8 @@ use crate::camera::reflector::{Found, estalella};
 use crate::plan::EnvironmentCube;
 use crate::plan::search::{ReflectorPart, Search};
 
-const ESTALELLA: Search = Search::Estalella(estalella::Ends { iterations: 9, epsilon: 0.0 });
+/// To its end: before, it depends on the eye how far it has come.
+const ESTALELLA: Search = Search::Estalella(estalella::Ends { iterations: 20, epsilon: 0.0 });
 const ROGER: Search = Search::Roger { iterations: 20, px: 0.01 };
 const EYES: [DVec3; 4] = [
     DVec3::new(0.0, 0.3, 5.0),
@@ -100,7 +101,7 @@ const MUTANTS: [(&str, &str, Search); 18] = [
     ("face = select(2u, 3u,", "face = select(3u, 2u,", ROGER),
     ("* 0.5 * side + 0.5", "* 0.5 * side", ROGER),
     ("texel * 6u + part", "texel * 6u", ESTALELLA),
-    ("return vec3(v.x * v.y * a,", "return vec3(1.0 + v.x * v.y * a,", ROGER),
+    ("let point = u * read.w;", "let point = u;", ROGER),
     ("vertex = given - at.normal", "vertex = given + at.normal", ESTALELLA),
     ("0.5 * (1.0 - dot(b, at.normal))", "0.5 * dot(b, at.normal)", ESTALELLA),
     ("nearest - ahead * depth", "nearest + ahead * depth", ESTALELLA),
@@ -108,11 +109,7 @@ const MUTANTS: [(&str, &str, Search); 18] = [
     ("reach - dot(middle.toward, ahead)", "reach + dot(middle.toward, ahead)", ESTALELLA),
     ("along = turned;", "along = -turned;", ESTALELLA),
     ("read.xyz * along + (e - u * along) * read.w", "(e - u * along) * read.w", ROGER),
-    (
-        "let b = sample_at(vertex, foot_direction(unit_or(task.eye,",
-        "let b = sample_at(vertex, foot_direction(unit_or(-task.eye,",
-        ROGER,
-    ),
+    ("let along = dot(e, u);", "let along = 0.5 * dot(e, u);", ROGER),
     ("let beta = (ab * ac - aa * bc)", "let beta = (ab * ac + aa * bc)", ROGER),
     ("outward = s.point - s.slope", "outward = s.point", ROGER),
     ("found[2u * i + 1u]", "found[2u * i]", ROGER),
