@@ -86,12 +86,7 @@ fn project(camera: u32, images: Images, piece: u32) -> Image {
         let p = images.pieces.ends.y;
         let q = images.pieces.ends.z;
         let noise_at = vec2(noise(camera, images.q, p), noise(camera, images.q, q));
-        let double = touches(images.cubic, images.pieces, noise_at);
-        if double.x && piece < 2u {
-            root = Root(p, true);
-        } else if double.y && piece > 0u {
-            root = Root(q, true);
-        }
+        root = double_root(images.cubic, images.pieces, piece, noise_at);
     }
     if !root.found {
         return Image(root.lambda, 0.0, 0.0, false);

@@ -103,17 +103,26 @@ fn pieces_between(c: vec4<f32>, lo: f32, hi: f32) -> Pieces {
     return Pieces(vec4(lo, critical_points(c, lo, hi), hi), 3u);
 }
 
-/// The points where the cubic turns round nearer to zero than rounding tells, without a root beside it: double roots.
-fn touches(c: vec4<f32>, pieces: Pieces, noise: vec2<f32>) -> vec2<bool> {
+/// For a piece without a root: that where the cubic turns round nearer to zero than rounding tells, without a root beside
+/// it, or on zero itself, where the root is the other piece's end.
+fn double_root(c: vec4<f32>, pieces: Pieces, piece: u32, noise: vec2<f32>) -> Root {
     let lo = pieces.ends.x;
     let p = pieces.ends.y;
     let q = pieces.ends.z;
     let hi = pieces.ends.w;
     let middle = crosses(c, p, q, false);
-    let at_p = lo < p && p < hi && !crosses(c, lo, p, true) && !middle && abs(value(c, p)) <= noise.x;
-    let at_q = lo < q && q < hi && !(middle || at_p) && !crosses(c, q, hi, false)
-        && abs(value(c, q)) <= noise.y;
-    return vec2(at_p, at_q);
+    let at_p = lo < p && p < hi && !middle;
+    let touches_p = at_p && !crosses(c, lo, p, true) && abs(value(c, p)) <= noise.x;
+    let both_p = touches_p || (at_p && value(c, p) == 0.0);
+    if (piece == 0u && touches_p) || (piece == 1u && both_p) {
+        return Root(p, true);
+    }
+    let at_q = lo < q && q < hi && !crosses(c, q, hi, false);
+    let touches_q = at_q && !(middle || both_p) && abs(value(c, q)) <= noise.y;
+    if (piece == 1u && touches_q) || (piece == 2u && (touches_q || (at_q && value(c, q) == 0.0))) {
+        return Root(q, true);
+    }
+    return Root(lo, false);
 }
 
 /// The root in one of the pieces, which are in rising order.

@@ -115,13 +115,16 @@ impl<R: Real> Cubic<R> {
             self.monotone_root(p, q, false),
             self.monotone_root(q, hi, false),
         ];
+        let zero = lo.splat(R::Scalar::from_f64(0.0));
         for (k, turn) in [p, q].into_iter().enumerate() {
-            let alone = !(root[k].1 | root[k + 1].1) & lo.lt(turn) & turn.lt(hi);
-            if R::any(alone) {
-                let touches = alone & self.value(turn).abs().le(noise(turn));
-                for root in &mut root[k..k + 2] {
-                    *root = (R::select(touches, turn, root.0), root.1 | touches);
-                }
+            let inside = lo.lt(turn) & turn.lt(hi) & !root[k + 1].1;
+            if R::any(inside) {
+                let value = self.value(turn).abs();
+                let touches = inside & !root[k].1 & value.le(noise(turn));
+                // On zero itself it is the end of one piece, and has to be the beginning of the other.
+                let both = touches | (inside & value.le(zero));
+                root[k] = (R::select(touches, turn, root[k].0), root[k].1 | touches);
+                root[k + 1] = (R::select(both, turn, root[k + 1].0), root[k + 1].1 | both);
             }
         }
         Roots { root, count: 3 }

@@ -154,10 +154,8 @@ fn projectors_count_as_subdivision_does() {
     );
     assert_eq!(wrong, 0, "of {decided}; {example:?}");
     assert!(undecided * 1000 <= total, "{undecided} of {total} undecided");
-    // Rounding to f32 alone moves folds so far that 0.015 % of all images are gone, those nearest to them.
     let all = |of: &[usize]| of.iter().sum::<usize>();
-    assert!(all(&lost) * 2_000 <= all(&images), "f32 lost {lost:?} of {images:?}");
-    assert!(all(&lost[2..]) * 10_000 <= all(&images[2..]), "f32 lost {lost:?} of {images:?}");
+    assert!(all(&lost) * 10_000 <= all(&images), "f32 lost {lost:?} of {images:?}");
     assert!(points.iter().all(|&n| n > total / 100_000), "all counts occur: {points:?}");
 }
 
