@@ -10,7 +10,7 @@ use crate::frame::{FrameReport, Renderer};
 use crate::image::compare::{Comparison, Percentiles, Set, Side, compare};
 use crate::image::temporal::{Restlessness, Sequence};
 use crate::image::{NONE, Picture, Planes};
-use crate::methods::{METHODS, Method, ParamKind, Params, method};
+use crate::methods::{METHODS, Method, Params, method};
 use crate::paths::{PathFinder, PathOptions, PathScene};
 use crate::scene::PreparedScene;
 use crate::scene::description::Scene;
@@ -179,19 +179,16 @@ impl Trial<'_> {
         Ok(Measured { report, errors: compare(own, truth, &Set::Objects)? })
     }
 
-    /// Each whole-numbered quality knob, one at a time.
+    /// Each quality knob, one at a time.
     fn turn(&self, renderer: &mut Renderer, method: &dyn Method) -> Result<Vec<Setting>> {
         let mut settings = Vec::new();
         for knob in method.info().params.iter().filter(|p| p.is_quality_knob) {
-            let ParamKind::Integer(low, high) = knob.kind else { continue };
             let values = KNOB_VALUES.iter().filter(|(id, _)| *id == knob.id);
             for &value in values.flat_map(|(_, values)| *values) {
-                if (low..=high).contains(&value) {
-                    let mut params = Params::defaults(method.info().params);
-                    params.set(knob, &value.to_string())?;
-                    let measured = self.measure(renderer, method, &params)?;
-                    settings.push(Setting { knob: knob.id, value: value.to_string(), measured });
-                }
+                let mut params = Params::defaults(method.info().params);
+                params.set(knob, value)?;
+                let measured = self.measure(renderer, method, &params)?;
+                settings.push(Setting { knob: knob.id, value: value.to_owned(), measured });
             }
         }
         Ok(settings)
@@ -264,9 +261,11 @@ impl Places {
 }
 
 /// Values of the knobs, from fast to exact.
-const KNOB_VALUES: [(&str, &[u32]); 4] = [
-    ("detail", &[1, 2, 4, 8]),
-    ("spp", &[1, 4, 16]),
-    ("iterations", &[3, 5, 9, 20]),
-    ("cube-side", &[64, 128, 256, 512, 1024]),
+const KNOB_VALUES: [(&str, &[&str]); 6] = [
+    ("detail", &["1", "2", "4", "8"]),
+    ("spp", &["1", "4", "16"]),
+    ("grid", &["0.041", "0.055", "0.096", "0.143"]),
+    ("iterations", &["3", "5", "7", "9", "20"]),
+    ("tessellate", &["64", "16", "4"]),
+    ("cube-side", &["64", "128", "256", "512", "1024"]),
 ];
