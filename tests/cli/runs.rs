@@ -9,7 +9,7 @@ fn keys(value: &Value) -> Vec<&str> {
 }
 
 /// The keys of a frame's figures, in order.
-const FIGURES: [&str; 17] = [
+const FIGURES: [&str; 18] = [
     "scene",
     "method",
     "backend",
@@ -24,6 +24,7 @@ const FIGURES: [&str; 17] = [
     "valid_share",
     "mirror_pixels",
     "covered_pixels",
+    "notes",
     "threads",
     "simd",
     "ms",

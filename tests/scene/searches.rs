@@ -9,9 +9,7 @@ use catoptric::scene::PreparedScene;
 use catoptric::scene::description::Scene;
 use glam::DVec3;
 
-use super::{
-    BLUE, GREY, RED, eye, looks, moved, object, prepared, rendered, rendered_with, scene, shape,
-};
+use super::{BLUE, GREY, RED, eye, looks, moved, object, prepared, rendered_with, scene, shape};
 
 /// A ball between a ground, a torus and a cube, all finely tessellated.
 fn around_a_ball() -> Scene {
@@ -59,20 +57,24 @@ fn shown(scene: &PreparedScene, id: &str, settings: &[(&str, &str)]) -> (Picture
 fn reflected_meshes_are_where_rays_see_them() {
     let scene = prepared(&around_a_ball(), 100_000);
     let truth = shown(&scene, "raytrace", &[("mirror-occlusion", "off")]).1;
-    for (id, settings, most) in [
-        ("estalella", &[][..], 0.02),
-        ("estalella", &[("grid", "0.1")][..], 0.03),
-        ("estalella", &[("tessellate", "4")][..], 0.02),
-        ("estalella", &[("primitive", "points")][..], 0.08),
-        ("roger-holzschuch", &[][..], 0.02),
-        ("roger-holzschuch", &[("early-exit", "off")][..], 0.02),
-        ("roger-holzschuch", &[("tessellate", "4")][..], 0.02),
-        ("roger-holzschuch", &[("primitive", "points"), ("point", "square1")][..], 0.30),
+    // Points are as far apart as they were sampled, and leave holes.
+    for (id, settings, [most, far]) in [
+        ("estalella", &[][..], [0.01, 0.01]),
+        ("estalella", &[("grid", "0.1")][..], [0.01, 0.01]),
+        ("estalella", &[("tessellate", "4")][..], [0.01, 0.01]),
+        ("estalella", &[("primitive", "points")][..], [0.08, 0.06]),
+        ("roger-holzschuch", &[][..], [0.01, 0.01]),
+        ("roger-holzschuch", &[("early-exit", "off")][..], [0.01, 0.01]),
+        ("roger-holzschuch", &[("tessellate", "4")][..], [0.01, 0.01]),
+        ("roger-holzschuch", &[("primitive", "points"), ("point", "square1")][..], [0.3, 0.06]),
     ] {
         let found = shown(&scene, id, settings).1;
         let (wrong, apart) = (wrong(&found, &truth), apart(&found, &truth));
         eprintln!("{id} {settings:?}: {:.2} % wrong, {apart:.4} apart", 100.0 * wrong);
-        assert!(wrong < most && apart < 0.02, "{id} {settings:?}: {wrong} wrong, {apart} apart");
+        assert!(
+            wrong < most && f64::from(apart) < far,
+            "{id} {settings:?}: {wrong} wrong, {apart} apart"
+        );
     }
     // A map from the centre shows things near the mirror elsewhere.
     let found = shown(&scene, "environment", &[]).1;
@@ -147,5 +149,6 @@ fn what_cannot_be_searched_on_is_refused() {
         transform: Similarity { scale: 1.4, ..Similarity::IDENTITY },
     });
     let stands_in = prepared(&described, 1_000);
-    assert!(rendered(&stands_in, "estalella", 80, 60).1.object.contains(&0), "with a stand-in");
+    let params = Params::defaults(method("estalella").unwrap().info().params);
+    assert!(method("estalella").unwrap().qualify(&stands_in, &params).is_ok(), "with a stand-in");
 }

@@ -45,11 +45,24 @@ impl Place {
         self.to_scene.point(point.as_dvec3() + self.center).as_vec3()
     }
 
+    /// Where a reflected point seems to be: behind its reflection point as far as it is from there. Once the search has
+    /// converged that is the point mirrored in the tangent plane (Estalella et al. section 3); before, an error of the normal
+    /// would move that one by twice the point's distance.
+    fn virtual_place(&self, point: Vec3, found: &Found) -> Vec3 {
+        let sight = found.point - self.eye;
+        let length = sight.length().max(f32::MIN_POSITIVE);
+        found.point + sight * (point.distance(found.point) / length)
+    }
+
     /// `point` is local.
     #[expect(clippy::cast_possible_truncation, reason = "lengths are f32 everywhere")]
     fn image(&self, point: Vec3, found: &Found) -> Image {
         let scale = self.to_scene.scale as f32;
-        let place = if self.is_virtual { found.mirrored(point) } else { found.point };
+        let place = match (self.is_virtual, found.hidden) {
+            (true, false) => self.virtual_place(point, found),
+            (true, true) => found.mirrored(point),
+            (false, _) => found.point,
+        };
         let height = found.height(point).abs();
         let height = if found.hidden { -height } else { height };
         Image {

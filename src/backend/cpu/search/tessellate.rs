@@ -7,12 +7,16 @@ use glam::{Vec2, Vec3};
 use super::Done;
 use super::images::{Image, Reflecting};
 use super::pieces::{Corner, Piece};
+use crate::camera::Eye;
 use crate::error::Result;
 
 /// An edge is halved so many times at most.
 const MOST_ROUNDS: usize = 8;
 /// An object is divided into so many pieces at most, beside its own triangles.
 const MOST_PIECES: usize = 1 << 20;
+
+/// Pieces across the end of the reflected region are short with edges of so many times the goal.
+const SHORT: f32 = 2.0;
 
 /// Which edges are halved.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +28,18 @@ pub(super) struct Goal {
 }
 
 impl Goal {
+    /// Whether a piece is drawn: where it ends in the hidden region, only if it has become short. Images of points far within
+    /// that region say nothing.
+    pub(super) fn keeps(&self, piece: &Piece, eye: &Eye) -> bool {
+        let [a, b, c] = piece.corners.map(|corner| corner.image);
+        let short = |a: Image, b: Image| {
+            let ends = eye.project_px(a.place).zip(eye.project_px(b.place));
+            ends.is_some_and(|(a, b)| a.distance(b) <= SHORT * self.longest_px)
+        };
+        let reflected = [a, b, c].iter().all(|image| image.height > 0.0);
+        reflected || (short(a, b) && short(b, c) && short(c, a))
+    }
+
     /// Whether an edge with its ends there is halved.
     fn asks(&self, ends: [Option<Vec2>; 2]) -> bool {
         let [low, high] = self.window;

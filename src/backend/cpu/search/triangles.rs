@@ -64,7 +64,9 @@ pub(super) fn meshes(
             let own = (&positions[..], images);
             let pieces = tessellate(reflecting, first, triangles, own, goal, done)?;
             let mut cut = Vec::with_capacity(pieces.len());
-            pieces.iter().for_each(|piece| reflected_part(piece, &mut cut));
+            let eye = reflecting.pass.eye;
+            let kept = pieces.iter().filter(|piece| goal.keeps(piece, eye));
+            kept.for_each(|piece| reflected_part(piece, &mut cut));
             Mesh { images: Vec::new(), pieces: cut, whole: false }
         } else {
             let (mut pieces, at) = (Vec::new(), |i: u32| images[i as usize]);
