@@ -2,6 +2,8 @@
 
 use egui_kittest::SnapshotOptions;
 
+use super::super::settings::MirrorColors;
+
 use super::*;
 
 fn has_adapter() -> bool {
@@ -95,4 +97,18 @@ fn screenshots_of_the_readme() {
     until(&mut hands, "a kept camera", |v| v.pinned.as_ref().is_some_and(|p| p.trace.is_some()));
     viewer_mut(&mut hands).selected = None;
     take(&mut hands, "viewer-inside.png");
+    let settings = &mut viewer_mut(&mut hands).settings;
+    (settings.inspect, settings.paths, settings.caustic) = (false, true, true);
+    settings.mirror = MirrorColors::Class;
+    viewer_mut(&mut hands).pinned = None;
+    hands.step();
+    until(&mut hands, "the caustic", |v| {
+        v.display.as_ref().is_some_and(|d| d.map.is_some() && !d.caustic.is_empty())
+    });
+    // A point of the ground, which the belly shows, too.
+    let at = on_canvas(&hands, 0.47, 0.93);
+    click(&mut hands, at);
+    until(&mut hands, "paths", |v| v.pinned.as_ref().is_some_and(|p| !p.paths.is_empty()));
+    viewer_mut(&mut hands).selected = None;
+    take(&mut hands, "viewer-paths.png");
 }
