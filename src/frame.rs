@@ -92,6 +92,9 @@ impl FrameReport {
     }
 }
 
+/// A method, the version of a scene, and the parameters that matter.
+type MadeFor = (&'static str, u64, Vec<Value>);
+
 /// Renders frames; keeps its memory between them.
 pub struct Renderer {
     backend: Box<dyn Backend>,
@@ -101,7 +104,7 @@ pub struct Renderer {
     picture: Picture,
     white: f32,
     /// The last method's, with what it depends on.
-    made: Option<((&'static str, u64, Vec<Value>), Made)>,
+    made: Option<(MadeFor, Made)>,
 }
 
 impl Default for Renderer {

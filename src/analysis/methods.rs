@@ -15,6 +15,9 @@ use crate::paths::{PathFinder, PathOptions, PathScene};
 use crate::scene::PreparedScene;
 use crate::scene::description::Scene;
 
+/// Makes a backend for a method.
+pub type MakeBackend<'a> = dyn Fn(&dyn Method) -> Result<Box<dyn Backend>> + 'a;
+
 /// What is measured, and how often.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
@@ -86,7 +89,7 @@ pub struct Entry {
 
 /// What the reference is, and what every method makes of the scene, in the order of the registry.
 ///
-/// `described` is what the scene was made from; `backend` makes a backend for a method.
+/// `described` is what the scene was made from.
 ///
 /// # Errors
 /// The eye sees no mirror that reflects an object, or cancelled.
@@ -95,7 +98,7 @@ pub fn compare_methods(
     scene: &PreparedScene,
     eye: &Eye,
     effort: Effort,
-    backend: &dyn Fn(&dyn Method) -> Result<Box<dyn Backend>>,
+    backend: &MakeBackend<'_>,
     cx: &Context,
 ) -> Result<(Reference, Vec<Entry>)> {
     cx.step("reference", 0.0)?;
