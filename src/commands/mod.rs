@@ -255,7 +255,16 @@ pub(crate) fn with_method_flags(mut command: Command) -> Command {
                 .map(|m| m.info().id)
                 .collect();
             let unit = if p.unit.is_empty() { String::new() } else { format!(", {}", p.unit) };
-            let help = format!("{}{unit} [{}; {}]", p.about, p.takes(), users.join(", "));
+            // Methods may differ in what is standard.
+            let same = |m: &&&dyn Method| m.info().params.iter().find(|q| q.id == p.id);
+            let mut takes: Vec<String> = Vec::new();
+            for (m, q) in METHODS.iter().filter_map(|m| Some((m, same(&m)?))) {
+                if q.takes() != p.takes() {
+                    takes.push(format!("default {} for {}", q.default, m.info().id));
+                }
+            }
+            takes.insert(0, p.takes());
+            let help = format!("{}{unit} [{}; {}]", p.about, takes.join(", "), users.join(", "));
             command = command.arg(
                 Arg::new(p.id)
                     .long(p.id)
@@ -333,7 +342,9 @@ fn apply_flags(info: &MethodInfo, matches: &ArgMatches, params: &mut Params) -> 
 /// Refuses outputs that would overwrite one another.
 pub(crate) fn check_apart(outputs: &[(&str, Option<&Path>)]) -> Result<()> {
     for (i, (option, path)) in outputs.iter().enumerate() {
-        let same = |(_, other): &&(&str, Option<&Path>)| path.is_some() && other == path;
+        let known = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let own = path.map(known);
+        let same = |(_, other): &&(&str, Option<&Path>)| own.is_some() && other.map(known) == own;
         if let Some((other, _)) = outputs[..i].iter().find(same) {
             let problem = format!("names the same file as {other}");
             return Err(Error::input(*option, "", problem, "give another name"));

@@ -91,7 +91,11 @@ const CHUNK: usize = 1 << 16;
 pub(crate) fn run(args: &PathsArgs, cx: &Context) -> anyhow::Result<()> {
     let format = args.output.as_deref().map(format_of).transpose()?;
     check_json(args.json.as_ref())?;
-    check_apart(&[("--output", args.output.as_deref()), ("--json", args.json.as_deref())])?;
+    check_apart(&[
+        ("--points", Some(&args.points)),
+        ("--output", args.output.as_deref()),
+        ("--json", args.json.as_deref()),
+    ])?;
     begin(args.threads)?;
     let start = Instant::now();
     let request = Request {
@@ -349,6 +353,9 @@ impl Figures<'_> {
 
     fn json(&self, args: &PathsArgs, found: &Summary) -> Value {
         let paths = |value: Value| if args.count { Value::Null } else { value };
+        let misses = |value: f64| {
+            if args.count || found.images == 0 { Value::Null } else { json!(value) }
+        };
         let refined = |value: u64| if args.refine { json!(value) } else { Value::Null };
         json!({
             "scene": self.scene,
@@ -361,8 +368,8 @@ impl Figures<'_> {
             "points_near_caustic": found.near_caustic,
             "hidden_by_mirror": paths(json!(found.hidden[0])),
             "hidden_by_object": paths(json!(found.hidden[1])),
-            "miss_mean": paths(json!(found.miss_sum / found.images.max(1) as f64)),
-            "miss_max": paths(json!(found.miss_max)),
+            "miss_mean": misses(found.miss_sum / found.images.max(1) as f64),
+            "miss_max": misses(found.miss_max),
             "refined": refined(found.refined),
             "not_refined": refined(found.failed),
             "threads": rayon::current_num_threads(),

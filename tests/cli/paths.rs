@@ -185,3 +185,21 @@ fn an_output_that_fails_keeps_the_old_file() {
     folder.refused(line, &["late.xyz: line 200001: \"three\" is not a number"]);
     assert_eq!(folder.read("out.npy"), b"precious");
 }
+
+#[test]
+fn points_are_not_overwritten_nor_guessed() {
+    let folder = Folder::new();
+    let text = "x,y,z\n0,0.6,2\n";
+    folder.write("p.csv", text).write("odd.csv", "id,px,py,pz\n7,1,2,3\n");
+    for output in ["p.csv", "./p.csv"] {
+        folder.refused(
+            &format!("paths --mirror sphere --points p.csv -o {output}"),
+            &["--output: names the same file as --points; "],
+        );
+    }
+    assert_eq!(folder.read("p.csv"), text.as_bytes());
+    folder.refused(
+        "paths --mirror sphere --points odd.csv -o out.csv",
+        &["odd.csv: line 1: names columns, but not x, y and z; "],
+    );
+}

@@ -236,6 +236,9 @@ fn write(folder: &Path, findings: &Findings, value: &Value) -> anyhow::Result<()
     if let (Some(slice), Some(plot)) = (&findings.slice, slice_plot) {
         write_picture(&place("slice.png"), &slice.slice.picture())?;
         write_bytes(&place("slice.svg"), plot.as_bytes())?;
+    } else {
+        // None that an earlier analysis left: they need not be there.
+        let _ = [place("slice.png"), place("slice.svg")].map(std::fs::remove_file);
     }
     write_bytes(&place("caustic.ply"), &caustic)?;
     write_bytes(&place("histogram.svg"), histogram.as_bytes())?;

@@ -44,10 +44,14 @@ pub(super) fn summary(findings: &Findings) -> String {
     let [one, two, three] = percent(&findings.one_camera);
     let line = |name: &str, set: &ImageHistogram| {
         let parts = (0..set.over_all.len()).filter(|n| set.over_all[*n] > 0);
-        let parts: Vec<String> = parts
-            .take(MOST_PRINTED)
-            .map(|n| format!("{n}: {:.2} %", 100.0 * set.share(n)))
-            .collect();
+        let all: Vec<usize> = parts.collect();
+        let (few, more) = all.split_at(all.len().min(MOST_PRINTED));
+        let part = |n: &usize| format!("{n}: {:.2} %", 100.0 * set.share(*n));
+        let mut parts: Vec<String> = few.iter().map(part).collect();
+        if !more.is_empty() {
+            let share: f64 = more.iter().map(|&n| set.share(n)).sum();
+            parts.push(format!("more: {:.2} %", 100.0 * share));
+        }
         format!("  images of points on {name}: {}", parts.join(", "))
     };
     let mut lines = vec![

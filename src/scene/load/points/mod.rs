@@ -99,9 +99,9 @@ impl PointReader {
         let mut points = Vec::with_capacity(most.min(ROOM));
         while points.len() < most {
             let Some(point) = self.source.next(&mut self.input, self.index)? else { break };
-            if !point.abs().cmple(DVec3::splat(MAX_COORDINATE)).all() {
-                let problem = "is not a finite number, or larger than 1e15";
-                return Err(self.input.error(self.source.place(self.index), problem, REPAIR));
+            if !point.to_array().into_iter().all(is_coordinate) {
+                let place = self.source.place(self.index);
+                return Err(self.input.error(place, NO_COORDINATE, REPAIR));
             }
             self.index += 1;
             points.push(point);
@@ -111,6 +111,12 @@ impl PointReader {
         }
         Ok(points)
     }
+}
+
+const NO_COORDINATE: &str = "is not a finite number, or larger than 1e15";
+
+fn is_coordinate(value: f64) -> bool {
+    value.abs() <= MAX_COORDINATE
 }
 
 impl Input {

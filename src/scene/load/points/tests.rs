@@ -100,8 +100,9 @@ fn what_is_no_file_of_points_is_refused() {
     for (name, bytes, expected) in [
         ("a.xyz", &b"1 2 3\n1 2\n"[..], "line 2: has fewer than three numbers"),
         ("a.xyz", b"1 2 3\n1 two 3\n", "line 2: \"two\" is not a number"),
-        ("a.xyz", b"1 2 3\n\n1 nan 3\n", "row 1: is not a finite number"),
-        ("a.xyz", b"1 2 -1e16\n", "row 0: is not a finite number, or larger than 1e15"),
+        ("a.xyz", b"1 2 3\n\n1 nan 3\n", "line 3: \"nan\" is not a finite number"),
+        ("a.xyz", b"1 2 -1e16\n", "line 1: \"-1e16\" is not a finite number, or larger than 1e15"),
+        ("a.csv", b"id,px,py,pz\n7,1,2,3\n", "line 1: names columns, but not x, y and z"),
         ("a.xyz", b"# nothing\n\n", "has no points"),
         ("a.xyz", b"1 2 \xff\n", "line 1: is not text"),
         ("a.xyz", long.as_bytes(), "line 1: is longer than 65536 bytes"),

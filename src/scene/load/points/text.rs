@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Input, Source};
+use super::{Input, NO_COORDINATE, Source, is_coordinate};
 use crate::error::Result;
 use crate::scene::load::REPAIR;
 
@@ -47,7 +47,15 @@ impl Source for Rows {
                 None => {
                     let columns = named_columns(text);
                     self.columns = Some(columns.unwrap_or([0, 1, 2]));
-                    if columns.is_some() || words(text).next().is_some_and(is_name) {
+                    if columns.is_some() {
+                        continue;
+                    }
+                    if words(text).next().is_some_and(is_name) {
+                        if words(text).count() != 3 {
+                            let problem = "names columns, but not x, y and z";
+                            let remedy = "name the columns of the coordinates x, y and z";
+                            return Err(input.error(input.place(), problem, remedy));
+                        }
                         continue;
                     }
                     [0, 1, 2]
@@ -92,6 +100,9 @@ fn point(input: &Input, words: [Option<&str>; 3]) -> Result<DVec3> {
         *value = word.parse().map_err(|_| {
             input.error(input.place(), format!("\"{word}\" is not a number"), REPAIR)
         })?;
+        if !is_coordinate(*value) {
+            return Err(input.error(input.place(), format!("\"{word}\" {NO_COORDINATE}"), REPAIR));
+        }
     }
     Ok(DVec3::from_array(values))
 }
