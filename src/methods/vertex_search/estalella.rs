@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use super::grid::grid;
 use super::{
-    MAP_SIDE, MAP_TRIANGLES, POINT, PREPARES_WITH, PRIMITIVE, TESSELLATE, made, primitive, qualify,
-    reflectors,
+    MAP_SIDE, MAP_TRIANGLES, POINT, PRIMITIVE, TESSELLATE, made, primitive, qualify, reflectors,
 };
 use crate::camera::reflector::estalella::Ends;
 use crate::context::Context;
@@ -13,7 +12,7 @@ use crate::error::Result;
 use crate::methods::{
     FrameInput, Made, Method, MethodInfo, ParamInfo, ParamKind, Params, Preset, Value,
 };
-use crate::plan::search::{Primitive, Search, SearchPass};
+use crate::plan::search::{Search, SearchPass};
 use crate::plan::{Pass, Plan};
 use crate::scene::prepared::PreparedScene;
 
@@ -83,11 +82,14 @@ impl Method for Estalella {
     }
 
     fn prepares_with(&self) -> &'static [&'static str] {
-        &PREPARES_WITH
+        &[MAP_SIDE.id, MAP_TRIANGLES.id, "grid"]
     }
 
     fn prepare(&self, scene: &PreparedScene, params: &Params, cx: &Context) -> Result<Made> {
-        reflectors(scene, params, cx)
+        let share = f64::from(params.number("grid"));
+        let objects = scene.objects.iter().filter(|_| share > 0.0);
+        let grids = objects.map(|o| grid(o.mesh.positions(), share)).collect();
+        reflectors(scene, params, grids, cx)
     }
 
     fn plan<'a>(
@@ -97,14 +99,6 @@ impl Method for Estalella {
         params: &Params,
         out: &mut Plan<'a>,
     ) -> Result<()> {
-        let share = f64::from(params.number("grid"));
-        let primitive = primitive(params);
-        let triangles = matches!(primitive, Primitive::Triangles { .. });
-        let objects = frame.scene.objects.iter();
-        let grids = match share > 0.0 && triangles {
-            true => objects.map(|o| grid(o.mesh.positions(), share)).collect(),
-            false => Vec::new(),
-        };
         let ends =
             Ends { iterations: params.integer("iterations"), epsilon: params.number("epsilon") };
         out.notes.extend_from_slice(&made(maps).notes);
@@ -112,8 +106,8 @@ impl Method for Estalella {
             eye: frame.eye,
             parts: Arc::clone(&made(maps).parts),
             search: Search::Estalella(ends),
-            primitive,
-            grids: Arc::new(grids),
+            primitive: primitive(params),
+            grids: Arc::clone(&made(maps).grids),
         })));
         Ok(())
     }

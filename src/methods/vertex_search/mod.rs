@@ -19,12 +19,14 @@ use super::{Made, ParamInfo, ParamKind, Params, Value};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::plan::SplatShape;
-use crate::plan::search::{Primitive, ReflectorPart};
+use crate::plan::search::{Grid, Primitive, ReflectorPart};
 use crate::scene::prepared::PreparedScene;
 
 /// What the searches make once a scene.
 pub(super) struct Reflectors {
     parts: Arc<Vec<ReflectorPart>>,
+    /// By object, if there are any.
+    grids: Arc<Vec<Grid>>,
     /// What cannot be searched on.
     notes: Vec<String>,
 }
@@ -74,8 +76,6 @@ const TESSELLATE: ParamInfo = ParamInfo {
     is_quality_knob: true,
 };
 
-const PREPARES_WITH: [&str; 2] = [MAP_SIDE.id, MAP_TRIANGLES.id];
-
 fn primitive(params: &Params) -> Primitive {
     if params.choice("primitive") == "points" {
         let one = params.choice("point") == "square1";
@@ -93,7 +93,12 @@ fn qualify(scene: &PreparedScene, params: &Params) -> Result<()> {
 }
 
 /// Maps the reflectors of all mirrors.
-fn reflectors(scene: &PreparedScene, params: &Params, cx: &Context) -> Result<Made> {
+fn reflectors(
+    scene: &PreparedScene,
+    params: &Params,
+    grids: Vec<Grid>,
+    cx: &Context,
+) -> Result<Made> {
     let (mut list, mut notes) = (Vec::new(), Vec::new());
     for mirror in 0..scene.mirrors.len() {
         let (shapes, others) = parts::shapes(scene, mirror, params.integer("map-triangles"))?;
@@ -107,7 +112,7 @@ fn reflectors(scene: &PreparedScene, params: &Params, cx: &Context) -> Result<Ma
                 .map(|name| format!("{name} is not star-shaped: it shows the environment only")),
         );
     }
-    Ok(Arc::new(Reflectors { parts: Arc::new(list), notes }))
+    Ok(Arc::new(Reflectors { parts: Arc::new(list), grids: Arc::new(grids), notes }))
 }
 
 /// What [`reflectors`] made.

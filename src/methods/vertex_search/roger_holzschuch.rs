@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    MAP_SIDE, MAP_TRIANGLES, POINT, PREPARES_WITH, PRIMITIVE, TESSELLATE, made, primitive, qualify,
-    reflectors,
+    MAP_SIDE, MAP_TRIANGLES, POINT, PRIMITIVE, TESSELLATE, made, primitive, qualify, reflectors,
 };
 use crate::context::Context;
 use crate::error::Result;
@@ -71,11 +70,11 @@ impl Method for RogerHolzschuch {
     }
 
     fn prepares_with(&self) -> &'static [&'static str] {
-        &PREPARES_WITH
+        &[MAP_SIDE.id, MAP_TRIANGLES.id]
     }
 
     fn prepare(&self, scene: &PreparedScene, params: &Params, cx: &Context) -> Result<Made> {
-        reflectors(scene, params, cx)
+        reflectors(scene, params, Vec::new(), cx)
     }
 
     fn plan<'a>(
@@ -92,7 +91,7 @@ impl Method for RogerHolzschuch {
             parts: Arc::clone(&made(maps).parts),
             search: Search::Roger { iterations: params.integer("iterations"), px },
             primitive: primitive(params),
-            grids: Arc::default(),
+            grids: Arc::clone(&made(maps).grids),
         })));
         Ok(())
     }

@@ -27,7 +27,7 @@ const fn core(splat: &'static str, path: Path, from: &'static str, to: &'static 
 
 use Path::{Compute as C, Vertex as V};
 
-const MUTANTS: [Mutant; 37] = [
+const MUTANTS: [Mutant; 38] = [
     // plan
     mutant("square2", C, "number - batch.x < batch.y", "number - batch.x < batch.y - 1u"),
     mutant("square2", C, "(number - batch.x) * batch.w", "(number - batch.x)"),
@@ -38,6 +38,7 @@ const MUTANTS: [Mutant; 37] = [
     mutant("square2", C, "c.x + x * (c.y + x * (c.z", "c.x + x * (c.y - x * (c.z"),
     mutant("square2", C, "c.z * c.z - c.y * a", "c.z * c.z + c.y * a"),
     mutant("square2", C, "rising = f_lo < 0.0", "rising = f_lo < -1.0"),
+    mutant("square2", C, "abs(value(c, p)) <= noise.x", "abs(value(c, p)) <= 1e6 * noise.x"),
     mutant("square2", C, "least - slack", "least + 1e4 * slack"),
     mutant("square2", C, "row(camera + F1).xyz + row", "row(camera + F2).xyz + row"),
     mutant("square2", C, "-margin.y <= image.b2", "0.3 <= image.b2"),
