@@ -66,6 +66,12 @@ impl FrameReport {
         (projections > 0).then(|| valid as f64 / projections as f64)
     }
 
+    /// Everything of the frame but what is seen directly, wall time: the layer, or the rays. Not a number if neither was
+    /// timed.
+    pub fn reflection_ms(&self) -> f64 {
+        self.layer_ms.or(self.rays_ms).unwrap_or(f64::NAN)
+    }
+
     /// The last report with every time replaced by the median over all.
     ///
     /// # Panics

@@ -13,7 +13,7 @@ use catoptric::{Context, Error, Progress};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use commands::bench::{BenchArgs, What};
+use commands::bench::BenchArgs;
 use commands::render::{HowArgs, RenderArgs};
 #[cfg(feature = "viewer")]
 use commands::view::ViewArgs;
@@ -102,10 +102,7 @@ fn run(
         (Some(Verb::Paths(args)), _) => commands::paths::run(args, cx),
         (Some(Verb::Bench(args)), Some(own)) => {
             let own = own.subcommand().map_or(own, |(_, own)| own);
-            match &args.what {
-                What::Layer(layer) => commands::bench::layer(layer, own, cx),
-                What::Methods(methods) => commands::bench::methods::run(methods, cx),
-            }
+            commands::bench::run(args, own, cx)
         }
         _ => built_in_scene(started, cx),
     }

@@ -1,6 +1,7 @@
 //! What a frame does, looked at afterwards: pure functions of a scene, an eye and a method's parameters, which plan the
 //! frame anew and hook into none of its loops; and what mirrors do to an eye whatever the method.
 
+pub mod measure;
 pub mod methods;
 pub mod multiplicity;
 mod replay;

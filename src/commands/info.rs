@@ -111,8 +111,13 @@ fn adapters(args: &InfoArgs) -> anyhow::Result<()> {
         );
         say!("  timestamps: {}, 64-bit atomics: {}", yes(a.timestamps), yes(a.atomics_64));
     }
-    let list: Vec<_> = list
-        .iter()
+    write_json(args.json.as_ref(), &json!({ "adapters": adapter_figures(&list) }))
+}
+
+/// What the README documents of each adapter.
+#[cfg(feature = "gpu")]
+pub(crate) fn adapter_figures(list: &[catoptric::backend::gpu::Adapter]) -> serde_json::Value {
+    list.iter()
         .map(|a| {
             json!({
                 "name": a.name,
@@ -126,8 +131,7 @@ fn adapters(args: &InfoArgs) -> anyhow::Result<()> {
                 "atomics_64": a.atomics_64,
             })
         })
-        .collect();
-    write_json(args.json.as_ref(), &json!({ "adapters": list }))
+        .collect()
 }
 
 #[cfg(feature = "gpu")]

@@ -36,9 +36,13 @@ fn fits(surfels: usize, size: ImageSize, free: u64) -> Result<()> {
 
 /// Bytes that programs may still take; `None` where the system does not say.
 fn free() -> Option<u64> {
-    // Linux only: elsewhere it would take a system call, which safe Rust has not.
+    line("MemAvailable:")
+}
+
+/// A line of what Linux says about its memory, bytes: elsewhere it would take a system call, which safe Rust has not.
+pub(crate) fn line(name: &str) -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.saturating_mul(1024))
 }
 

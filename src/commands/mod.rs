@@ -4,6 +4,7 @@ pub(crate) mod analyze;
 pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod info;
+mod machine;
 mod memory;
 pub(crate) mod paths;
 mod plots;
@@ -48,19 +49,8 @@ pub(crate) use say;
 /// What to render and how to look at it.
 #[derive(Args, Debug)]
 pub(crate) struct SceneArgs {
-    /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply) to be set beside the teapot
-    #[arg(value_name = "SCENE|MODEL")]
-    inputs: Vec<String>,
-    /// Mirror: a mesh file, used as placed, or a built-in shape; repeatable
-    #[arg(long, value_name = "FILE|NAME")]
-    mirror: Vec<String>,
-    /// What stands for a mirror where a method needs a closed, star-shaped one (estalella, roger-holzschuch): a mesh file in
-    /// the mirror's own space, or a built-in shape, made as large as the mirror; repeatable, in the mirrors' order
-    #[arg(long, value_name = "FILE|NAME")]
-    proxy: Vec<String>,
-    /// Object: a mesh file, used as placed, or a built-in shape; repeatable
-    #[arg(long, value_name = "FILE|NAME")]
-    object: Vec<String>,
+    #[command(flatten)]
+    pub(crate) place: PlaceArgs,
     /// Surfels over all objects
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SURFELS, allow_negative_numbers = true)]
     surfels: usize,
@@ -70,9 +60,27 @@ pub(crate) struct SceneArgs {
     /// Tree nodes of at most this share of their object's size are leaves
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_negative_numbers = true)]
     leaf_size: f32,
+}
+
+/// What stands where, and who looks at it.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct PlaceArgs {
+    /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply) to be set beside the teapot
+    #[arg(value_name = "SCENE|MODEL")]
+    pub(crate) inputs: Vec<String>,
+    /// Mirror: a mesh file, used as placed, or a built-in shape; repeatable
+    #[arg(long, value_name = "FILE|NAME")]
+    pub(crate) mirror: Vec<String>,
+    /// What stands for a mirror where a method needs a closed, star-shaped one (estalella, roger-holzschuch): a mesh file in
+    /// the mirror's own space, or a built-in shape, made as large as the mirror; repeatable, in the mirrors' order
+    #[arg(long, value_name = "FILE|NAME")]
+    proxy: Vec<String>,
+    /// Object: a mesh file, used as placed, or a built-in shape; repeatable
+    #[arg(long, value_name = "FILE|NAME")]
+    pub(crate) object: Vec<String>,
     /// Seed of the sampling
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
-    seed: u64,
+    pub(crate) seed: u64,
     /// Eye position, world space
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     eye: Option<DVec3>,
@@ -124,17 +132,14 @@ pub(crate) struct Ready {
     pub(crate) described: Scene,
 }
 
-impl SceneArgs {
-    /// The scene without a command line: the built-in one.
-    pub(crate) fn default_scene() -> Self {
+impl PlaceArgs {
+    /// The built-in scene.
+    fn default_scene() -> Self {
         Self {
             inputs: Vec::new(),
             mirror: Vec::new(),
             proxy: Vec::new(),
             object: Vec::new(),
-            surfels: DEFAULT_SURFELS,
-            leaf: None,
-            leaf_size: 0.0,
             seed: 1,
             eye: None,
             target: None,
@@ -144,9 +149,9 @@ impl SceneArgs {
         }
     }
 
-    /// What can be refused before anything is read, and the threads.
-    pub(crate) fn begin(&self) -> anyhow::Result<()> {
-        memory::check(self.surfels, self.size)?;
+    /// What can be refused before anything is read, and the threads. `surfels`: as many as will be made.
+    pub(crate) fn begin(&self, surfels: usize) -> anyhow::Result<()> {
+        memory::check(surfels, self.size)?;
         begin(self.threads)
     }
 
@@ -163,6 +168,33 @@ impl SceneArgs {
         }
     }
 
+    /// The eye of a prepared scene.
+    pub(crate) fn eye(&self, scene: &PreparedScene) -> Result<Eye> {
+        self.eye_at(scene, self.size)
+    }
+
+    /// The eye of a prepared scene, for a picture of another size.
+    pub(crate) fn eye_at(&self, scene: &PreparedScene, size: ImageSize) -> Result<Eye> {
+        seen(scene.eye_for(size), "--eye, --target, --fov")
+    }
+}
+
+impl SceneArgs {
+    /// The scene without a command line: the built-in one.
+    pub(crate) fn default_scene() -> Self {
+        Self {
+            place: PlaceArgs::default_scene(),
+            surfels: DEFAULT_SURFELS,
+            leaf: None,
+            leaf_size: 0.0,
+        }
+    }
+
+    /// See [`PlaceArgs::begin`].
+    pub(crate) fn begin(&self) -> anyhow::Result<()> {
+        self.place.begin(self.surfels)
+    }
+
     /// How it is to be prepared. `leaf` is a preset's leaf size.
     pub(crate) fn prepare_options(&self, leaf: Option<u32>) -> PrepareOptions {
         let standard = KdTreeLimits::default();
@@ -172,7 +204,7 @@ impl SceneArgs {
                 leaf_points: self.leaf.or(leaf).unwrap_or(standard.leaf_points),
                 leaf_size: self.leaf_size,
             },
-            seed: self.seed,
+            seed: self.place.seed,
         }
     }
 
@@ -180,16 +212,11 @@ impl SceneArgs {
     pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
         self.begin()?;
         let start = Instant::now();
-        let described = arrange::scene(&self.request(), cx)?;
+        let described = arrange::scene(&self.place.request(), cx)?;
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
         let scene = PreparedScene::new(&described, &self.prepare_options(leaf), cx)?;
-        let eye = self.eye(&scene)?;
+        let eye = self.place.eye(&scene)?;
         Ok(Ready { scene, eye, load_ms, described })
-    }
-
-    /// The eye of a prepared scene.
-    pub(crate) fn eye(&self, scene: &PreparedScene) -> Result<Eye> {
-        seen(scene.eye_for(self.size), "--eye, --target, --fov")
     }
 }
 

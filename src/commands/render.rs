@@ -311,7 +311,7 @@ impl Subject<'_> {
 }
 
 /// The instruction set in use, such as `avx2`.
-fn simd_name() -> String {
+pub(crate) fn simd_name() -> String {
     let level = format!("{:?}", simd_level());
     level.split('(').next().unwrap_or_default().to_ascii_lowercase()
 }

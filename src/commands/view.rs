@@ -100,10 +100,10 @@ pub(crate) fn run(
     };
     let measured = args.frames.is_some() || args.screenshot.is_some();
     let opening = Opening {
-        request: args.scene.request(),
+        request: args.scene.place.request(),
         prepare: args.scene.prepare_options(leaf),
         side: (chosen || measured).then_some(side),
-        size: (said("size") || measured).then_some(args.scene.size),
+        size: (said("size") || measured).then_some(args.scene.place.size),
         frames: args.frames,
         screenshot: args.screenshot.clone(),
         started,

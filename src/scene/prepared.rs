@@ -3,6 +3,9 @@
 
 mod look_up;
 mod place;
+mod trees;
+
+pub use trees::SurfelBytes;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -36,6 +39,29 @@ pub struct PrepareOptions {
 impl Default for PrepareOptions {
     fn default() -> Self {
         Self { surfels: DEFAULT_SURFELS, tree: KdTreeLimits::default(), seed: 1 }
+    }
+}
+
+impl PrepareOptions {
+    /// # Errors
+    /// One is out of its range.
+    pub(super) fn check(&self) -> Result<()> {
+        if self.surfels == 0 || self.surfels > MAX_SURFELS {
+            return Err(Error::input(
+                "--surfels",
+                "",
+                format!("{} is not between 1 and {MAX_SURFELS}", self.surfels),
+                "choose a number in that range",
+            ));
+        }
+        if self.tree.leaf_points == 0 {
+            return Err(Error::input("--leaf", "", "0 is not a leaf size", "choose 1 or more"));
+        }
+        if !(0.0..=1.0).contains(&self.tree.leaf_size) {
+            let problem = format!("{} is not between 0 and 1", self.tree.leaf_size);
+            return Err(Error::input("--leaf-size", "", problem, "choose a share such as 0.01"));
+        }
+        Ok(())
     }
 }
 
@@ -207,21 +233,7 @@ impl PreparedScene {
     /// # Errors
     /// An option is out of its range, or cancelled.
     pub fn new(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Result<Self> {
-        if options.surfels == 0 || options.surfels > MAX_SURFELS {
-            return Err(Error::input(
-                "--surfels",
-                "",
-                format!("{} is not between 1 and {MAX_SURFELS}", options.surfels),
-                "choose a number in that range",
-            ));
-        }
-        if options.tree.leaf_points == 0 {
-            return Err(Error::input("--leaf", "", "0 is not a leaf size", "choose 1 or more"));
-        }
-        if !(0.0..=1.0).contains(&options.tree.leaf_size) {
-            let problem = format!("{} is not between 0 and 1", options.tree.leaf_size);
-            return Err(Error::input("--leaf-size", "", problem, "choose a share such as 0.01"));
-        }
+        options.check()?;
         let start = Instant::now();
         let mut sampled = sample_objects(scene, options, cx)?;
         sampled.extend(sample_mirrors(scene, options.surfels, options.seed, cx)?);

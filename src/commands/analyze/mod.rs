@@ -120,9 +120,9 @@ pub(crate) fn run(args: &AnalyzeArgs, cx: &Context) -> anyhow::Result<()> {
 
 fn find(args: &AnalyzeArgs, cx: &Context) -> anyhow::Result<Findings> {
     args.scene.begin()?;
-    let described = arrange::scene(&args.scene.request(), cx)?;
+    let described = arrange::scene(&args.scene.place.request(), cx)?;
     let scene = PreparedScene::new(&described, &args.scene.prepare_options(None), cx)?;
-    let eye = args.scene.eye(&scene)?;
+    let eye = args.scene.place.eye(&scene)?;
     let ray_scale = RayScale::from(args.ray_scale);
     check_triangle(args.triangle, scene.mirror_triangle_count())?;
 

@@ -87,7 +87,7 @@ impl PreparedScene {
 }
 
 impl Cloud {
-    fn place(&mut self, to_scene: Similarity) {
+    pub(super) fn place(&mut self, to_scene: Similarity) {
         let local = self.tree.bounds();
         let corner = |i: u32| {
             let pick = |bit: u32, lo: f32, hi: f32| if i >> bit & 1 == 0 { lo } else { hi };

@@ -1,0 +1,116 @@
+//! `catoptric bench layer`: the reflected layer against reflected rays.
+
+use std::path::PathBuf;
+
+use catoptric::analysis::measure::{Quantity, Ratio, Rounds, Side, Stage, Timed, interleave};
+use catoptric::backend::Backend;
+use catoptric::backend::cpu::Cpu;
+use catoptric::camera::Eye;
+use catoptric::methods::{Method, Params, method};
+use catoptric::scene::PreparedScene;
+use catoptric::{Context, Error};
+use clap::{ArgMatches, Args};
+use serde_json::json;
+
+use super::super::render::{HowArgs, figures, where_it_ran};
+use super::super::{SceneArgs, check_json, chosen_method, ms, say, write_json};
+use super::report;
+
+/// See [`super::What::Layer`].
+#[derive(Args, Debug)]
+pub(crate) struct LayerArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    how: HowArgs,
+    /// Pairs of measurements
+    #[arg(long, value_name = "N", default_value_t = 25, allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    repeat: u32,
+    /// Write the figures as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Rounds that warm caches and memory up and do not count.
+const WARM_UP: u32 = 3;
+
+pub(super) fn run(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> anyhow::Result<()> {
+    check_json(args.json.as_ref())?;
+    let (method, params, leaf) = chosen_method(&args.how, matches)?;
+    if method.info().id == "raytrace" {
+        let problem = "raytrace is what the layer is compared with";
+        return Err(Error::input("--method", "", problem, "choose another method").into());
+    }
+    let backend = args.how.backend(method)?;
+    let ready = args.scene.ready(leaf, cx)?;
+    let rounds =
+        Rounds { repeat: args.repeat, warm_up: WARM_UP, least_ms: 0.0, most_ms: f64::INFINITY };
+    let step = |done| cx.step("measuring", done);
+    let pair =
+        against_rays(&ready.scene, &ready.eye, backend, method, params, rounds, (cx, &step))?;
+    let report = pair.layer.report();
+    if report.mirror_pixels == 0 {
+        let remedy = "choose another --eye, --target or --size";
+        return Err(Error::input("bench layer", "", "the eye sees no mirror", remedy).into());
+    }
+    say!(
+        "{} by {} on {}: layer {:.2} ms, rays {:.2} ms, ratio {:.3} (quartiles {:.3} to {:.3}, {} pairs{})",
+        ready.scene.name,
+        report.method,
+        where_it_ran(&report),
+        pair.layer_ms.median,
+        pair.rays_ms.median,
+        pair.ratio.of.median,
+        pair.ratio.of.q1,
+        pair.ratio.of.q3,
+        args.repeat,
+        if pair.ratio.noisy { ", noisy" } else { "" }
+    );
+    let mut value = figures(&ready, &report);
+    value["layer_ms"] = ms(Some(pair.layer_ms.median));
+    value["rays_ms"] = ms(Some(pair.rays_ms.median));
+    value["ratio"] = report::ratio(Some(pair.ratio));
+    value["pairs"] = json!(args.repeat);
+    write_json(args.json.as_ref(), &value)
+}
+
+/// A layer beside the rays of the same pixels.
+pub(super) struct Pair {
+    pub(super) layer: Timed,
+    pub(super) layer_ms: Quantity,
+    pub(super) rays_ms: Quantity,
+    /// The layer's time by the rays'.
+    pub(super) ratio: Ratio,
+}
+
+/// What long work is given here: the context, and where to say how far it is.
+pub(super) type Watch<'a> = (&'a Context, &'a dyn Fn(f64) -> catoptric::Result<()>);
+
+/// Measures the layer and one ray a pixel in turn.
+pub(super) fn against_rays(
+    scene: &PreparedScene,
+    eye: &Eye,
+    backend: Box<dyn Backend>,
+    layer: &'static dyn Method,
+    params: Params,
+    rounds: Rounds,
+    (cx, step): Watch<'_>,
+) -> anyhow::Result<Pair> {
+    let rays = method("raytrace").expect("it is in the registry");
+    let mut rays_params = Params::defaults(rays.info().params);
+    // Both look for what mirrors hide, or neither.
+    let info = rays.info().param("mirror-occlusion");
+    if params.get(info.id).is_some() {
+        rays_params.set(info, params.choice(info.id))?;
+    }
+    let on_cpu = Box::new(Cpu::default());
+    let mut stages = [Stage::new(scene, eye, backend), Stage::new(scene, eye, on_cpu)];
+    let sides =
+        [Side::new(&stages, 0, layer, params, cx)?, Side::new(&stages, 1, rays, rays_params, cx)?];
+    let mut timed = interleave(&mut stages, &sides, rounds, step)?;
+    let [a, b] = [0, 1].map(|i| timed[i].reflection_ms());
+    let ratio = Ratio::of(&a, &b).expect("there is a round");
+    let quantity = |values| Quantity::of(values).expect("there is a round");
+    Ok(Pair { layer: timed.swap_remove(0), layer_ms: quantity(a), rays_ms: quantity(b), ratio })
+}
