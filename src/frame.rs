@@ -138,6 +138,11 @@ impl Renderer {
         }
     }
 
+    /// The backend, for another renderer.
+    pub fn into_backend(self) -> Box<dyn Backend> {
+        self.backend
+    }
+
     /// Keeps values brighter than a display's white, for pictures in floating point.
     pub fn keep_bright(&mut self) {
         self.white = f32::INFINITY;

@@ -82,6 +82,11 @@ impl<'a> Stage<'a> {
         &mut self.renderer
     }
 
+    /// The backend, for another stage.
+    pub fn into_backend(self) -> Box<dyn Backend> {
+        self.renderer.into_backend()
+    }
+
     fn run(&mut self, side: &Side) -> Result<FrameReport> {
         let Side { method, params, made, .. } = side;
         let reflected =

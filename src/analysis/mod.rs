@@ -1,13 +1,16 @@
 //! What a frame does, looked at afterwards: pure functions of a scene, an eye and a method's parameters, which plan the
 //! frame anew and hook into none of its loops; and what mirrors do to an eye whatever the method.
 
+pub mod balance;
 pub mod measure;
 pub mod methods;
+mod mirror_parts;
 pub mod multiplicity;
 mod replay;
 mod trace_camera;
 mod triangle_costs;
 
+pub use mirror_parts::{PartCost, part_costs};
 pub use replay::{CloudTrace, MOST_TRACED, Outcome, TracedSurfel, VisitedBox};
 pub use trace_camera::{CameraTrace, trace_camera};
 pub use triangle_costs::triangle_costs;

@@ -278,7 +278,11 @@ fn table_2(rows: &[Measured]) -> Table {
     table
 }
 
+/// `None` for the published setting itself.
 fn to_published(row: &Measured, timed: &Timed) -> Option<Ratio> {
+    if std::ptr::eq(timed, &row.frames[0]) {
+        return None;
+    }
     Ratio::of(&timed.reflection_ms(), &row.frames[0].reflection_ms())
 }
 

@@ -94,6 +94,22 @@ pub fn parts(name: &str, triangles: Option<usize>) -> Vec<(&'static str, std::op
     teapot::parts(wanted).into_iter().map(range).collect()
 }
 
+/// As [`parts`], with the teapot's knob apart from its lid: parts that differ in how they are curved.
+pub fn regions(
+    name: &str,
+    triangles: Option<usize>,
+) -> Vec<(&'static str, std::ops::Range<usize>)> {
+    let mut list = parts(name, triangles);
+    if let Some(lid) = list.iter().position(|(part, _)| name == "teapot" && *part == "lid") {
+        let range = list[lid].1.clone();
+        let wanted = find(name, triangles).map_or(0, |(_, wanted)| wanted);
+        let end = range.start + teapot::knob(wanted);
+        list[lid].1.start = end;
+        list.insert(lid, ("knob", range.start..end));
+    }
+    list
+}
+
 /// The closed surface that an open built-in shape with about so many triangles is a part of, in the same space; `None` if
 /// there is none.
 pub fn closed(name: &str, triangles: Option<usize>) -> Option<Mesh> {

@@ -103,6 +103,12 @@ pub(super) fn parts(wanted: usize) -> Vec<(&'static str, usize)> {
     parts.map(count).to_vec()
 }
 
+/// How many of the lid's triangles, its first ones, are the knob's: the upper one of its two patches.
+pub(super) fn knob(wanted: usize) -> usize {
+    let [rows, columns] = cuts(wanted);
+    4 * columns * (2 * rows - 1)
+}
+
 /// The control points of one closed curve about a part: three a patch, since patches share their ends.
 fn ring([radius, reach, height]: Ring) -> Vec<DVec3> {
     let quarter = [DVec2::new(radius, 0.0), DVec2::new(radius, reach), DVec2::new(reach, radius)];
