@@ -1,4 +1,4 @@
-//! Times that can be trusted: sides that take turns, medians with quartiles, ratios pair by pair.
+//! Times that can be trusted: sides that take turns with a reference, medians with quartiles, ratios pair by pair.
 
 use crate::backend::Backend;
 use crate::camera::Eye;
@@ -144,17 +144,29 @@ pub const LEAST_TURNS: usize = 3;
 /// A turn has no more frames.
 const MOST_FRAMES: f64 = 32.0;
 
-/// What one side took: a report a turn, in the order of the rounds from the first.
+/// What one side took, by turn.
 #[derive(Clone, Debug, Default)]
 pub struct Timed {
     /// Each the median of a turn's frames.
     pub reports: Vec<FrameReport>,
+    /// Milliseconds of the reference's turns before and after each, their mean.
+    pub beside_ms: Vec<f64>,
 }
 
 impl Timed {
     /// Reflections of a frame, milliseconds, by turn.
     pub fn reflection_ms(&self) -> Vec<f64> {
         self.reports.iter().map(FrameReport::reflection_ms).collect()
+    }
+
+    /// Quartiles of that; `None` if nothing was measured.
+    pub fn total(&self) -> Option<Quantity> {
+        Quantity::of(self.reflection_ms())
+    }
+
+    /// To the reference, turn by turn; `None` for the reference itself.
+    pub fn ratio(&self) -> Option<Ratio> {
+        Ratio::of(&self.reflection_ms(), &self.beside_ms)
     }
 
     /// Quartiles of a stage's time; `None` if it was not timed apart.
@@ -171,40 +183,61 @@ impl Timed {
     }
 }
 
-/// Runs the sides in turn, A B C A B C, and says what each took. `step` is told how much is done, 0 to 1, before each turn.
+/// Measures sides against a reference, which has a turn before and after each of them: A B A C A, A B A C A. So a ratio is
+/// of neighbours in time, and what the machine does slowly cancels out. Returns the reference's times and each side's.
+/// `step` is told how much is done, 0 to 1, before each turn of a side.
 ///
 /// # Errors
 /// A backend failed, or `step` did.
-pub fn interleave(
+pub fn against(
     stages: &mut [Stage<'_>],
+    reference: &Side,
     sides: &[Side],
     rounds: Rounds,
     mut step: impl FnMut(f64) -> Result<()>,
-) -> Result<Vec<Timed>> {
+) -> Result<(Timed, Vec<Timed>)> {
     let mut timed = vec![Timed::default(); sides.len()];
-    let mut frames = vec![1_u32; sides.len()];
+    let mut own = Timed::default();
+    let (mut frames, mut own_frames) = (vec![1; sides.len()], 1);
     let mut spent = vec![0.0; sides.len()];
     let total = rounds.warm_up + rounds.repeat;
     for round in 0..total {
+        let warm = round >= rounds.warm_up;
+        step(f64::from(round) / f64::from(total))?;
+        let mut before = turn(stages, reference, own_frames)?;
+        if !warm {
+            own_frames = frames_that_fit(rounds.least_ms, before.reflection_ms());
+        }
         for (i, side) in sides.iter().enumerate() {
             let done = f64::from(round) + i as f64 / sides.len() as f64;
             step(done / f64::from(total))?;
             if spent[i] > rounds.most_ms && timed[i].reports.len() >= LEAST_TURNS {
                 continue;
             }
-            let stage = &mut stages[side.stage];
-            let turn: Result<Vec<FrameReport>> = (0..frames[i]).map(|_| stage.run(side)).collect();
-            let report = FrameReport::median(&turn?);
+            let report = turn(stages, side, frames[i])?;
             let ms = report.reflection_ms();
-            if round < rounds.warm_up {
+            if !warm {
                 frames[i] = frames_that_fit(rounds.least_ms, ms);
-            } else {
-                spent[i] += ms * f64::from(frames[i]);
-                timed[i].reports.push(report);
+                continue;
             }
+            let after = turn(stages, reference, own_frames)?;
+            spent[i] += ms * f64::from(frames[i]);
+            timed[i].beside_ms.push(0.5 * (before.reflection_ms() + after.reflection_ms()));
+            timed[i].reports.push(report);
+            own.reports.push(std::mem::replace(&mut before, after));
+        }
+        if warm {
+            own.reports.push(before);
         }
     }
-    Ok(timed)
+    Ok((own, timed))
+}
+
+/// The median of so many frames of one side.
+fn turn(stages: &mut [Stage<'_>], side: &Side, frames: u32) -> Result<FrameReport> {
+    let stage = &mut stages[side.stage];
+    let reports: Result<Vec<FrameReport>> = (0..frames).map(|_| stage.run(side)).collect();
+    Ok(FrameReport::median(&reports?))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to MOST_FRAMES")]

@@ -117,7 +117,11 @@ pub fn compare_methods(
     Ok((reference, entries))
 }
 
-fn reference(scene: &PreparedScene, eye: &Eye, spp: u32, cx: &Context) -> Result<Reference> {
+/// The picture of `spp` rays a pixel.
+///
+/// # Errors
+/// The eye sees no mirror that reflects an object, or cancelled.
+pub fn reference(scene: &PreparedScene, eye: &Eye, spp: u32, cx: &Context) -> Result<Reference> {
     let rays = method("raytrace").expect("it is in the registry");
     let mut params = Params::defaults(rays.info().params);
     params.set(rays.info().param("spp"), &spp.to_string())?;

@@ -2,6 +2,7 @@
 //! frame anew and hook into none of its loops; and what mirrors do to an eye whatever the method.
 
 pub mod balance;
+pub mod break_even;
 pub mod measure;
 pub mod methods;
 mod mirror_parts;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use catoptric::analysis::measure::{Quantity, Ratio, Rounds, Side, Stage, Timed, interleave};
+use catoptric::analysis::measure::{Quantity, Ratio, Rounds, Side, Stage, Timed, against};
 use catoptric::backend::Backend;
 use catoptric::backend::cpu::Cpu;
 use catoptric::camera::Eye;
@@ -106,11 +106,14 @@ pub(super) fn against_rays(
     }
     let on_cpu = Box::new(Cpu::default());
     let mut stages = [Stage::new(scene, eye, backend), Stage::new(scene, eye, on_cpu)];
-    let sides =
-        [Side::new(&stages, 0, layer, params, cx)?, Side::new(&stages, 1, rays, rays_params, cx)?];
-    let mut timed = interleave(&mut stages, &sides, rounds, step)?;
-    let [a, b] = [0, 1].map(|i| timed[i].reflection_ms());
-    let ratio = Ratio::of(&a, &b).expect("there is a round");
-    let quantity = |values| Quantity::of(values).expect("there is a round");
-    Ok(Pair { layer: timed.swap_remove(0), layer_ms: quantity(a), rays_ms: quantity(b), ratio })
+    let layer = Side::new(&stages, 0, layer, params, cx)?;
+    let rays = Side::new(&stages, 1, rays, rays_params, cx)?;
+    let (rays, mut timed) = against(&mut stages, &rays, &[layer], rounds, step)?;
+    let (layer, all) = (timed.swap_remove(0), "there is a round");
+    Ok(Pair {
+        layer_ms: layer.total().expect(all),
+        rays_ms: rays.total().expect(all),
+        ratio: layer.ratio().expect(all),
+        layer,
+    })
 }

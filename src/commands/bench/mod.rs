@@ -4,6 +4,9 @@
 //! [`report::Section`] of what they took, and `report` writes it.
 
 mod balance;
+mod crossover;
+mod curve;
+mod growth;
 mod layer;
 pub(crate) mod methods;
 mod report;
@@ -49,6 +52,13 @@ enum What {
     /// Says where the least total is on this machine and why, and which setting is nearest to the paper's 20 % of valid
     /// projections.
     Balance(RunArgs),
+    /// Time and memory over surfels (to 10^7, or --max), mirror triangles, pixels and curvature
+    Growth(RunArgs),
+    /// Against ray tracing at equal error: who wins where, over mirror triangles and pixels, and the break-even
+    ///
+    /// The paper conjectures that cameras pay where a mirror triangle covers enough pixels. For the scenes knot and room (or
+    /// the given one) this measures where, against 1, 4 and 16 rays a pixel.
+    Crossover(RunArgs),
 }
 
 pub(crate) fn run(args: &BenchArgs, matches: &ArgMatches, cx: &Context) -> anyhow::Result<()> {
@@ -57,5 +67,7 @@ pub(crate) fn run(args: &BenchArgs, matches: &ArgMatches, cx: &Context) -> anyho
         What::Methods(args) => methods::run(args, cx),
         What::Tables(args) => single(args, cx, tables::section),
         What::Balance(args) => single(args, cx, balance::section),
+        What::Growth(args) => single(args, cx, growth::section),
+        What::Crossover(args) => single(args, cx, crossover::section),
     }
 }

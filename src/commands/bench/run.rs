@@ -24,7 +24,7 @@ use super::report::{self, Block, Head, Section};
 pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) place: PlaceArgs,
-    /// Turns of each side that count (default 15, or 5 with --quick)
+    /// Turns of each side that count (default 11, or 5 with --quick)
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub(crate) repeat: Option<u32>,
@@ -87,10 +87,10 @@ impl<'a> Bench<'a> {
     pub(super) fn rounds(self) -> Rounds {
         let quick = self.args.quick;
         Rounds {
-            repeat: self.args.repeat.unwrap_or(if quick { 5 } else { 15 }),
+            repeat: self.args.repeat.unwrap_or(if quick { 5 } else { 11 }),
             warm_up: 1,
-            least_ms: if quick { 15.0 } else { 60.0 },
-            most_ms: if quick { 1500.0 } else { 6000.0 },
+            least_ms: if quick { 15.0 } else { 50.0 },
+            most_ms: if quick { 1000.0 } else { 4000.0 },
         }
     }
 
@@ -178,6 +178,10 @@ pub(super) fn with_mirror_triangles(scene: &Scene, triangles: usize) -> Option<S
     Some(scene)
 }
 
+/// Where that is so.
+pub(super) const NOT_BUILT_IN: &str =
+    "The mirror is no built-in shape: it cannot be made of other numbers of triangles.";
+
 /// A bench of one section, by itself.
 pub(super) fn single(
     args: &RunArgs,
@@ -262,8 +266,8 @@ pub(super) fn head(args: &RunArgs, title: &str) -> Head {
         (
             "Method",
             format!(
-                "sides take turns (A B C A B C), {} turns after {} to warm up, each the median of as many frames as fit into \
-                 {:.0} ms; medians; ratios are of pairs of turns; ~ marks ratios whose quartiles are more than 10 % apart",
+                "a reference has a turn before and after each side (A B A C A), {} turns after {} to warm up, each the median of as many \
+                 frames as fit into {:.0} ms; medians; ratios are turn by turn; ~ marks ratios whose quartiles are more than 10 % apart",
                 rounds.repeat, rounds.warm_up, rounds.least_ms
             ),
         ),

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use catoptric::accel::KdTree;
 use catoptric::accel::kd_tree::KdTreeStatistics;
-use catoptric::analysis::measure::{Quantity, Ratio, Side, Stage, Timed, interleave};
+use catoptric::analysis::measure::{Quantity, Side, Stage, Timed, against};
 use catoptric::frame::FrameReport;
 use catoptric::scene::PreparedScene;
 use catoptric::scene::prepared::PrepareOptions;
@@ -116,7 +116,10 @@ pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
             sides.push(Side::new(&stages, stage, c3rc(), params, &part.silent())?);
         }
         let measuring = part.part(0.3, 1.0);
-        let frames = interleave(&mut stages, &sides, part.rounds(), |done| measuring.step(done))?;
+        let published = sides.remove(0);
+        let step = |done| measuring.step(done);
+        let (published, others) = against(&mut stages, &published, &sides, part.rounds(), step)?;
+        let frames = std::iter::once(published).chain(others).collect();
         rows.push(Measured { paper, surfels, trees, frames });
     }
     let size = bench.args.place.size;
@@ -265,25 +268,17 @@ fn table_2(rows: &[Measured]) -> Table {
             table.row(vec![
                 row.surfels.to_string(),
                 setting.name.to_owned(),
-                median(Quantity::of(timed.reflection_ms())),
+                median(timed.total()),
                 median(timed.quantity(|r| r.cull_ms)),
                 median(timed.quantity(|r| r.project_ms)),
                 report.valid_share().map_or("–".into(), |v| number(100.0 * v)),
                 projections.map_or("–".into(), |n| n.to_string()),
                 share.map_or("–".into(), number),
-                times(to_published(row, timed)),
+                times(timed.ratio()),
             ]);
         }
     }
     table
-}
-
-/// `None` for the published setting itself.
-fn to_published(row: &Measured, timed: &Timed) -> Option<Ratio> {
-    if std::ptr::eq(timed, &row.frames[0]) {
-        return None;
-    }
-    Ratio::of(&timed.reflection_ms(), &row.frames[0].reflection_ms())
 }
 
 /// Where the largest scene's time goes, there and here.
@@ -327,7 +322,7 @@ fn figures(row: &Measured) -> Value {
     let settings = SETTINGS.iter().zip(&row.frames).map(|(setting, timed)| {
         let mut value = frame_figures(timed);
         value["setting"] = json!(setting.name);
-        value["ratio_to_published"] = ratio(to_published(row, timed));
+        value["ratio_to_published"] = ratio(timed.ratio());
         value
     });
     json!({
@@ -355,7 +350,7 @@ pub(super) fn frame_figures(timed: &Timed) -> Value {
     json!({
         "backend": report.backend,
         "device": report.device,
-        "total_ms": quantity(Quantity::of(timed.reflection_ms())),
+        "total_ms": quantity(timed.total()),
         "cameras_ms": quantity(timed.quantity(|r| r.cameras_ms)),
         "cull_ms": quantity(timed.quantity(|r| r.cull_ms)),
         "project_ms": quantity(timed.quantity(|r| r.project_ms)),

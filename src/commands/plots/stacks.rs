@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::{Area, COLORS, FONT, LEGEND, TITLE, failed, legend, short, svg};
+use super::{Area, COLORS, LEGEND, TITLE, failed, legend, short, svg};
 
 /// One bar.
 pub(crate) struct Stack {
@@ -48,7 +48,7 @@ pub(crate) fn stacks(plots: &[StackPlot], labels: &StackLabels<'_>) -> anyhow::R
     svg((size.0 + LEGEND, size.1), |area| {
         let (left, right) = area.split_horizontally(size.0);
         let mut entries: Vec<(String, RGBColor)> =
-            labels.parts.iter().map(|n| (*n).to_owned()).zip(COLORS).collect();
+            labels.parts.iter().map(|n| (*n).to_owned()).zip(PARTS).collect();
         entries.push((labels.total.to_owned(), BLACK));
         entries.push((labels.share.to_owned(), SHARE));
         entries.push(("least".to_owned(), LEAST));
@@ -60,6 +60,8 @@ pub(crate) fn stacks(plots: &[StackPlot], labels: &StackLabels<'_>) -> anyhow::R
     })
 }
 
+/// Of the parts.
+const PARTS: [RGBColor; 4] = [COLORS[0], COLORS[1], COLORS[2], COLORS[4]];
 /// Of the share's line.
 const SHARE: RGBColor = COLORS[5];
 /// Of the mark at the least bar.
@@ -115,7 +117,7 @@ fn draw(
     for (i, stack) in plot.stacks.iter().enumerate() {
         let (left, right) = (i as f64 - 0.36, i as f64 + 0.36);
         let mut bottom = 0.0;
-        for (part, color) in stack.parts.iter().zip(COLORS) {
+        for (part, color) in stack.parts.iter().zip(PARTS) {
             let bar = Rectangle::new([(left, bottom), (right, bottom + part)], color.filled());
             chart.draw_series([bar]).map_err(failed)?;
             bottom += part;
@@ -138,6 +140,5 @@ fn draw(
         .map_err(failed)?;
     let dots = shares.iter().map(|&at| Circle::new(at, 3, SHARE.filled()));
     chart.draw_secondary_series(dots).map_err(failed)?;
-    let _ = FONT;
     Ok(())
 }

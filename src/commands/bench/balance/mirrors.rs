@@ -1,16 +1,15 @@
 //! The balance by what the mirror is: its number of triangles, and its parts.
 
-use catoptric::analysis::balance::exponent;
-use catoptric::analysis::measure::{Quantity, Ratio, Side, Stage, Timed, interleave};
+use catoptric::analysis::measure::{Side, Stage, against};
 use catoptric::analysis::part_costs;
 use catoptric::scene::PreparedScene;
 use catoptric::scene::description::Scene;
 use serde_json::{Value, json};
 
-use super::super::report::{Block, Image, Plot, Table, median, number, quantity, ratio, times};
-use super::super::run::{Bench, c3rc, paper_leaf, params, with_mirror_triangles};
-use super::super::tables::frame_figures;
-use crate::commands::plots::{Axis, Dot, LinePlot, Series, lines};
+use super::super::curve::{BALANCE, Curve, Row};
+use super::super::report::{Block, Table};
+use super::super::run::{Bench, NOT_BUILT_IN, c3rc, paper_leaf, params, with_mirror_triangles};
+use crate::commands::plots::Axis;
 
 /// What each part of the mirrors projects.
 pub(super) fn parts(
@@ -70,13 +69,6 @@ pub(super) fn parts(
 /// Which the tests are that are compared over the mirror's triangles.
 const SIDES: [(&str, &str); 2] = [("as published", "paper"), ("conservative test", "slab")];
 
-struct Row {
-    triangles: usize,
-    timed: Vec<Timed>,
-    /// To as published before the first mirror, by side.
-    ratios: Vec<Option<Ratio>>,
-}
-
 /// Time over the number of mirror triangles.
 pub(super) fn triangles(
     bench: Bench<'_>,
@@ -85,15 +77,12 @@ pub(super) fn triangles(
     blocks: &mut Vec<Block>,
 ) -> anyhow::Result<Value> {
     let wanted = bench.pick(&[2_000, 4_000, 8_000, 16_000, 32_000][..], &[2_000, 8_000, 32_000]);
-    let mut rows: Vec<Row> = Vec::new();
     let Some(first) = with_mirror_triangles(described, wanted[0]) else {
-        blocks.push(Block::Text(
-            "The mirror is no built-in shape: it cannot be made of other numbers of triangles."
-                .to_owned(),
-        ));
-        return Ok(json!([]));
+        blocks.push(Block::Text(NOT_BUILT_IN.to_owned()));
+        return Ok(Value::Null);
     };
     let base = bench.prepared(&first, surfels, paper_leaf())?;
+    let mut rows = Vec::new();
     for (i, &count) in wanted.iter().enumerate() {
         let part = bench.turn(i, wanted.len());
         part.step(0.0)?;
@@ -103,100 +92,24 @@ pub(super) fn triangles(
         let mut stages =
             [Stage::new(&base, &eye, part.backend()?), Stage::new(&scene, &eye, part.backend()?)];
         let own = |test: &str| params(c3rc(), "paper", &[("test", test)]);
-        let mut sides = vec![Side::new(&stages, 0, c3rc(), own("paper"), &part.silent())?];
+        let first = Side::new(&stages, 0, c3rc(), own("paper"), &part.silent())?;
+        let mut sides = Vec::new();
         for (_, test) in SIDES {
             sides.push(Side::new(&stages, 1, c3rc(), own(test), &part.silent())?);
         }
-        let mut timed = interleave(&mut stages, &sides, part.rounds(), |done| part.step(done))?;
-        let reference = timed.remove(0).reflection_ms();
-        let ratios = timed.iter().map(|t| Ratio::of(&t.reflection_ms(), &reference)).collect();
-        rows.push(Row { triangles: scene.mirror_triangle_count(), timed, ratios });
+        let step = |done| part.step(done);
+        let (_, timed) = against(&mut stages, &first, &sides, part.rounds(), step)?;
+        rows.push(Row { x: scene.mirror_triangle_count() as f64, timed, more: Vec::new() });
     }
-    show(&rows, blocks)?;
-    let settings = |row: &Row| {
-        let one = |((name, _), (timed, own)): (&(&str, &str), (&Timed, &Option<Ratio>))| {
-            let mut value = frame_figures(timed);
-            value["setting"] = json!(name);
-            value["ratio_to_first"] = ratio(*own);
-            value
-        };
-        SIDES.iter().zip(row.timed.iter().zip(&row.ratios)).map(one).collect::<Vec<_>>()
-    };
-    let list: Vec<Value> = rows
-        .iter()
-        .map(|row| json!({ "triangles": row.triangles, "settings": settings(row) }))
-        .collect();
-    Ok(json!(list))
-}
-
-fn show(rows: &[Row], blocks: &mut Vec<Block>) -> anyhow::Result<()> {
-    let mut table = Table::new(
-        "Mirror triangles",
-        &[
-            "triangles",
-            "setting",
-            "cameras",
-            "total ms",
-            "culling ms",
-            "projection ms",
-            "projections",
-            "to the first row",
-        ],
-    );
-    let (mut series, mut growth) = (Vec::new(), Vec::new());
-    for (k, (name, _)) in SIDES.iter().enumerate() {
-        let stages: [(&str, fn(&catoptric::frame::FrameReport) -> Option<f64>); 3] = [
-            ("total", |r| Some(r.reflection_ms())),
-            ("culling", |r| r.cull_ms),
-            ("projection", |r| r.project_ms),
-        ];
-        for (stage, pick) in stages {
-            let of = |row: &Row| Some((row.triangles as f64, row.timed[k].quantity(pick)?));
-            let points: Vec<(f64, Quantity)> = rows.iter().filter_map(of).collect();
-            let law: Vec<[f64; 2]> = points.iter().map(|(x, q)| [*x, q.median]).collect();
-            if let Some(power) = exponent(&law) {
-                growth.push(format!("{name}, {stage}: {}", number(power)));
-            }
-            let dots = points.iter().map(|&(x, q)| Dot { x, y: q.median, quartiles: [q.q1, q.q3] });
-            series.push(Series {
-                name: format!("{name}: {stage}"),
-                dots: dots.collect(),
-                joined: true,
-            });
-        }
-        for row in rows {
-            let report = row.timed[k].report();
-            table.row(vec![
-                row.triangles.to_string(),
-                (*name).to_owned(),
-                report.cameras.map_or("–".into(), |n| n.to_string()),
-                median(Quantity::of(row.timed[k].reflection_ms())),
-                median(row.timed[k].quantity(|r| r.cull_ms)),
-                median(row.timed[k].quantity(|r| r.project_ms)),
-                report.projections.map_or("–".into(), |n| n.to_string()),
-                times(row.ratios[k]),
-            ]);
-        }
-    }
-    let _ = quantity;
-    blocks.push(Block::Table(table));
-    if !growth.is_empty() {
-        blocks.push(Block::Text(format!(
-            "Time as a power of the number of mirror triangles (the paper says linear, which is 1): {}.",
-            growth.join("; ")
-        )));
-    }
-    let plot = LinePlot {
-        title: "Mirror triangles",
+    let curve = Curve {
+        id: "balance-triangles",
+        title: "Culling and projection over the mirror's triangles (the paper says: linear)".into(),
         x: Axis { label: "mirror triangles", log: true },
-        y: Axis { label: "ms", log: true },
-        series: &series,
-        level: None,
+        sides: SIDES.map(|side| side.0).to_vec(),
+        stages: &BALANCE,
+        rows,
+        reference: "as published before the first mirror",
     };
-    blocks.push(Block::Plot(Plot {
-        name: "balance-triangles".into(),
-        caption: "Culling, projection and the whole layer over the mirror's triangles; bars span the quartiles.".into(),
-        image: Image::Svg(lines(&plot)?),
-    }));
-    Ok(())
+    curve.show(blocks)?;
+    Ok(curve.figures("triangles"))
 }

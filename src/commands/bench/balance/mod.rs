@@ -6,7 +6,7 @@ mod sentence;
 mod show;
 
 use catoptric::analysis::balance::{Balance, BalancePoint};
-use catoptric::analysis::measure::{Quantity, Ratio, Side, Stage, Timed, interleave};
+use catoptric::analysis::measure::{Quantity, Side, Stage, Timed, against};
 use catoptric::backend::Backend;
 use catoptric::backend::cpu::Cpu;
 use catoptric::scene::PreparedScene;
@@ -28,9 +28,8 @@ struct Point {
     test: &'static str,
     detail: &'static str,
     leaf: u32,
+    /// In turn with the paper's setting.
     timed: Timed,
-    /// To the paper's setting, measured in turn with it.
-    ratio: Option<Ratio>,
 }
 
 /// The sweep on one backend.
@@ -58,7 +57,7 @@ impl Sweep {
             leaf: p.leaf,
             cull_ms: p.timed.quantity(|r| r.cull_ms).map_or(0.0, |q| q.median),
             project_ms: p.timed.quantity(|r| r.project_ms).map_or(f64::NAN, |q| q.median),
-            total: p.ratio.map_or(f64::NAN, |r| r.of.median * scale),
+            total: p.timed.ratio().map_or(f64::NAN, |r| r.of.median * scale),
             valid_share: p.timed.report().valid_share(),
         };
         self.of(test, detail).map(number).collect()
@@ -170,18 +169,16 @@ fn sweep(
     }
     let mut swept = base.clone();
     let (mut points, mut none, mut references) = (Vec::new(), None, Vec::new());
-    let (mut here, mut there) = (Some(backend()?), Some(backend()?));
+    let mut backends = [backend()?, backend()?];
     for (i, &leaf) in sizes.iter().enumerate() {
         let part = bench.turn(i, sizes.len());
         part.step(0.0)?;
         swept.rebuild_trees(leaves(leaf), &bench.silent())?;
-        let (Some(a), Some(b)) = (here.take(), there.take()) else {
-            unreachable!("they came back")
-        };
+        let [a, b] = backends;
         let mut stages = [Stage::new(base, &eye, a), Stage::new(&swept, &eye, b)];
-        let mut sides =
-            vec![Side::new(&stages, 0, c3rc(), params(c3rc(), "paper", &[]), &bench.silent())?];
-        let mut names = Vec::new();
+        let published = params(c3rc(), "paper", &[]);
+        let published = Side::new(&stages, 0, c3rc(), published, &bench.silent())?;
+        let (mut sides, mut names) = (Vec::new(), Vec::new());
         // Where leaves do not matter, one of them will do.
         let tests =
             TESTS.iter().flat_map(|&test| details.iter().map(move |&detail| (test, detail)));
@@ -191,17 +188,14 @@ fn sweep(
             sides.push(Side::new(&stages, 1, c3rc(), params, &bench.silent())?);
             names.push((test, detail));
         }
-        let mut timed =
-            interleave(&mut stages, &sides, rounds, |done| part.step(done))?.into_iter();
-        let reference = timed.next().unwrap_or_default().reflection_ms();
+        let step = |done| part.step(done);
+        let (reference, timed) = against(&mut stages, &published, &sides, rounds, step)?;
         for ((test, detail), timed) in names.into_iter().zip(timed) {
-            let ratio = Ratio::of(&timed.reflection_ms(), &reference);
-            let point = Point { test, detail, leaf, timed, ratio };
+            let point = Point { test, detail, leaf, timed };
             if test == "none" { none = Some(point) } else { points.push(point) }
         }
-        references.extend(reference);
-        let [a, b] = stages.map(Stage::into_backend);
-        (here, there) = (Some(a), Some(b));
+        references.extend(reference.reflection_ms());
+        backends = stages.map(Stage::into_backend);
     }
     let shares_counted = points.iter().any(|p| p.timed.report().valid.is_some());
     Ok(Sweep {

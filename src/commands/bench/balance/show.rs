@@ -1,7 +1,6 @@
 //! Tables, plots and figures of a sweep.
 
 use catoptric::analysis::balance::{Balance, nearest_to_share};
-use catoptric::analysis::measure::Quantity;
 use serde_json::{Value, json};
 
 use super::super::report::{Block, Image, Plot, Table, median, quantity, ratio, times};
@@ -42,7 +41,7 @@ pub(super) fn sweep(sweep: &Sweep, blocks: &mut Vec<Block>) -> anyhow::Result<()
 
 /// What is left out of the plots: it would dwarf them.
 fn untested(sweep: &Sweep) -> String {
-    let Point { timed, ratio, .. } = &sweep.none;
+    let timed = &sweep.none.timed;
     let report = timed.report();
     let valid = report
         .valid_share()
@@ -51,9 +50,9 @@ fn untested(sweep: &Sweep) -> String {
         "Without a test ({}) every object that a camera may see is projected whole: {} ms, {} projections{valid}; {} times the paper's \
          setting.",
         sweep.place,
-        median(Quantity::of(timed.reflection_ms())),
+        median(timed.total()),
         report.projections.unwrap_or(0),
-        times(*ratio)
+        times(timed.ratio())
     )
 }
 
@@ -67,6 +66,7 @@ fn plot(sweep: &Sweep, kind: &str, detail: &str) -> anyhow::Result<Plot> {
                     number.cull_ms,
                     number.project_ms,
                     point.timed.quantity(|r| r.splat_ms).map_or(0.0, |q| q.median),
+                    point.timed.quantity(|r| r.cameras_ms).map_or(0.0, |q| q.median),
                 ],
                 total: number.total,
                 share: number.valid_share,
@@ -81,7 +81,7 @@ fn plot(sweep: &Sweep, kind: &str, detail: &str) -> anyhow::Result<Plot> {
     let labels = StackLabels {
         x: "surfels a leaf",
         y: "ms",
-        parts: &["culling", "projection", "splatting"],
+        parts: &["culling", "projection", "splatting", "cameras"],
         total: "whole layer",
         share,
     };
@@ -118,12 +118,12 @@ fn table(sweep: &Sweep, detail: &str) -> Table {
             table.row(vec![
                 if least == Some(i) { format!("{test} (least)") } else { test.to_owned() },
                 point.leaf.to_string(),
-                median(Quantity::of(point.timed.reflection_ms())),
+                median(point.timed.total()),
                 median(point.timed.quantity(|r| r.cull_ms)),
                 median(point.timed.quantity(|r| r.project_ms)),
                 report.valid_share().map_or("–".into(), |v| format!("{:.1}", 100.0 * v)),
                 report.projections.map_or("–".into(), |n| n.to_string()),
-                times(point.ratio),
+                times(point.timed.ratio()),
             ]);
         }
     }
@@ -137,7 +137,7 @@ pub(super) fn figures(sweep: &Sweep) -> Value {
         value["test"] = json!(p.test);
         value["detail"] = json!(p.detail.parse::<u32>().unwrap_or(0));
         value["leaf"] = json!(p.leaf);
-        value["ratio_to_paper"] = ratio(p.ratio);
+        value["ratio_to_paper"] = ratio(p.timed.ratio());
         value
     };
     let verdicts = details(sweep).into_iter().flat_map(|detail| {

@@ -20,6 +20,7 @@ nav a { margin-right: 1rem; } a { color: inherit; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .15rem 1rem; } dt { color: var(--faint); } dd { margin: 0; }
 figure { margin: 1.5rem 0; overflow-x: auto; } figcaption, caption { color: var(--faint); text-align: left; padding: .3rem 0; }
 svg, img { max-width: 100%; height: auto; }
+details { margin: 1rem 0; } summary { cursor: pointer; }
 .wide { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
 th, td { padding: .2rem .6rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; } td.noisy { color: var(--mark); }
@@ -90,9 +91,20 @@ fn inlined(text: &str, caption: &str) -> String {
     text[start..].replacen("<svg ", &label, 1).replace(" xmlns=\"http://www.w3.org/2000/svg\"", "")
 }
 
+/// A table with more rows is folded up.
+const LONG: usize = 16;
+
 fn table(page: &mut String, table: &Table) {
+    let long = table.rows.len() > LONG;
+    if long {
+        let caption = escaped(&table.caption);
+        push(
+            page,
+            format_args!("<details><summary>{caption}: {} rows</summary>\n", table.rows.len()),
+        );
+    }
     page.push_str("<div class=\"wide\"><table>\n");
-    if !table.caption.is_empty() {
+    if !table.caption.is_empty() && !long {
         push(page, format_args!("<caption>{}</caption>\n", escaped(&table.caption)));
     }
     page.push_str("<thead><tr>");
@@ -107,6 +119,9 @@ fn table(page: &mut String, table: &Table) {
         page.push_str("</tr>\n");
     }
     page.push_str("</tbody>\n</table></div>\n");
+    if long {
+        page.push_str("</details>\n");
+    }
 }
 
 fn escaped(text: &str) -> String {
