@@ -33,6 +33,8 @@ pub struct FrameReport {
     pub projections: Option<u64>,
     /// Pairs with an image.
     pub valid: Option<u64>,
+    /// Steps of all searches together.
+    pub steps: Option<u64>,
     /// Pixels whose centre shows a mirror.
     pub mirror_pixels: usize,
     /// Those that objects cover at least half of.
@@ -70,6 +72,12 @@ impl FrameReport {
     /// timed.
     pub fn reflection_ms(&self) -> f64 {
         self.layer_ms.or(self.rays_ms).unwrap_or(f64::NAN)
+    }
+
+    /// Steps of a search, in the mean; `None` if nothing was searched for.
+    pub fn mean_steps(&self) -> Option<f64> {
+        let (searched, steps) = (self.projections?, self.steps?);
+        (searched > 0).then(|| steps as f64 / searched as f64)
     }
 
     /// The last report with every time replaced by the median over all.
@@ -237,6 +245,7 @@ impl Renderer {
             batches: done.batches,
             projections: done.projections,
             valid: done.valid,
+            steps: done.steps,
             mirror_pixels: self.visibility.mirror_ids.iter().filter(|&&id| id != NONE_ID).count(),
             covered_pixels: self.reflection.coverage.iter().filter(|&&c| c >= 0.5).count(),
             cameras_ms: done.cameras.map(|_| plan.times.cameras_ms),

@@ -13,7 +13,7 @@ use catoptric::{Context, Error, Progress};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use commands::bench::BenchArgs;
+use commands::bench::{BenchArgs, Kept};
 use commands::render::{HowArgs, RenderArgs};
 #[cfg(feature = "viewer")]
 use commands::view::ViewArgs;
@@ -70,7 +70,10 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if matches!(error.downcast_ref(), Some(Error::Cancelled)) => {
-            complain("cancelled: nothing was written");
+            match error.downcast_ref::<Kept>() {
+                Some(kept) => complain(&kept.to_string()),
+                None => complain("cancelled: nothing was written"),
+            }
             ExitCode::from(130)
         }
         Err(error) => {

@@ -28,8 +28,11 @@ fn point_at(i: u32) -> vec3<f32> {
 }
 
 fn store(i: u32, r: Result) {
+    // A hollow mirror hides what is behind the tangent plane at its image.
+    let behind = dot(point_at(i) - r.point, r.normal) <= 0.0;
+    let hidden = select(r.hidden, behind, task.inward != 0u);
     found[2u * i] = vec4(r.point, f32(r.steps));
-    found[2u * i + 1u] = vec4(r.normal, select(0.0, 1.0, r.hidden));
+    found[2u * i + 1u] = vec4(r.normal, select(0.0, 1.0, hidden));
 }
 
 @compute @workgroup_size(64)

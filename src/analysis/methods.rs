@@ -15,8 +15,8 @@ use crate::paths::{PathFinder, PathOptions, PathScene};
 use crate::scene::PreparedScene;
 use crate::scene::description::Scene;
 
-/// Makes a backend for a method.
-pub type MakeBackend<'a> = dyn Fn(&dyn Method) -> Result<Box<dyn Backend>> + 'a;
+/// Makes a backend for the candidate of that index.
+pub type MakeBackend<'a> = dyn Fn(usize, &dyn Method) -> Result<Box<dyn Backend>> + 'a;
 
 /// What is measured, and how often.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +29,6 @@ pub struct Effort {
     pub frames: u32,
     /// The orbit, radians.
     pub orbit: f64,
-    /// Whether quality knobs are turned.
-    pub knobs: bool,
 }
 
 /// The truth.
@@ -79,15 +77,41 @@ pub struct Drawn {
     pub settings: Vec<Setting>,
 }
 
-/// A method, or why it cannot draw the scene.
-pub struct Entry {
+/// A method with its parameters.
+#[derive(Clone)]
+pub struct Candidate {
+    /// What it is called: the method's name, and its parameters where they are not the defaults.
+    pub label: String,
     /// The method.
     pub method: &'static dyn Method,
+    /// Its parameters.
+    pub params: Params,
+    /// Whether its quality knobs are turned.
+    pub knobs: bool,
+}
+
+impl Candidate {
+    /// All methods with their defaults, in the order of the registry.
+    pub fn all(knobs: bool) -> Vec<Self> {
+        let candidate = |method: &'static dyn Method| Self {
+            label: method.info().id.to_owned(),
+            method,
+            params: Params::defaults(method.info().params),
+            knobs,
+        };
+        METHODS.into_iter().map(candidate).collect()
+    }
+}
+
+/// A candidate with what it draws, or why it cannot draw the scene.
+pub struct Entry {
+    /// The candidate.
+    pub candidate: Candidate,
     /// What it draws.
     pub result: std::result::Result<Box<Drawn>, Error>,
 }
 
-/// What the reference is, and what every method makes of the scene, in the order of the registry.
+/// What the reference is, and what every candidate makes of the scene.
 ///
 /// `described` is what the scene was made from.
 ///
@@ -97,6 +121,7 @@ pub fn compare_methods(
     described: &Scene,
     scene: &PreparedScene,
     eye: &Eye,
+    candidates: Vec<Candidate>,
     effort: Effort,
     backend: &MakeBackend<'_>,
     cx: &Context,
@@ -105,14 +130,16 @@ pub fn compare_methods(
     let reference = reference(scene, eye, effort.spp, cx)?;
     let places = Places::new(described);
     let mut entries = Vec::new();
-    for (i, method) in METHODS.into_iter().enumerate() {
-        cx.step(method.info().id, i as f64 / METHODS.len() as f64)?;
+    let count = candidates.len() as f64;
+    for (i, candidate) in candidates.into_iter().enumerate() {
+        cx.step(&candidate.label, i as f64 / count)?;
         let trial = Trial { scene, eye, effort, reference: &reference, places: &places, cx };
-        let result = match backend(method).and_then(|backend| trial.draw(method, backend)) {
+        let made = backend(i, candidate.method);
+        let result = match made.and_then(|backend| trial.draw(&candidate, backend)) {
             Err(Error::Cancelled) => return Err(Error::Cancelled),
             result => result.map(Box::new),
         };
-        entries.push(Entry { method, result });
+        entries.push(Entry { candidate, result });
     }
     Ok((reference, entries))
 }
@@ -152,16 +179,15 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    fn draw(&self, method: &dyn Method, backend: Box<dyn Backend>) -> Result<Drawn> {
+    fn draw(&self, candidate: &Candidate, backend: Box<dyn Backend>) -> Result<Drawn> {
+        let Candidate { method, ref params, knobs, .. } = *candidate;
         let mut renderer = Renderer::on(backend);
         renderer.keep_bright();
-        let params = Params::defaults(method.info().params);
-        let measured = self.measure(&mut renderer, method, &params)?;
+        let measured = self.measure(&mut renderer, method, params)?;
         let picture = renderer.picture().clone();
         let planes = renderer.planes().expect("they were asked for").clone();
-        let settings =
-            if self.effort.knobs { self.turn(&mut renderer, method)? } else { Vec::new() };
-        let restlessness = self.orbit(&mut renderer, method, &params)?;
+        let settings = if knobs { self.turn(&mut renderer, candidate)? } else { Vec::new() };
+        let restlessness = self.orbit(&mut renderer, method, params)?;
         let displacement_px = self.places.displacement(self.scene, self.eye, &planes, self.cx)?;
         Ok(Drawn { measured, picture, planes, displacement_px, restlessness, settings })
     }
@@ -187,12 +213,13 @@ impl Trial<'_> {
     }
 
     /// Each quality knob, one at a time.
-    fn turn(&self, renderer: &mut Renderer, method: &dyn Method) -> Result<Vec<Setting>> {
+    fn turn(&self, renderer: &mut Renderer, candidate: &Candidate) -> Result<Vec<Setting>> {
+        let method = candidate.method;
         let mut settings = Vec::new();
         for knob in method.info().params.iter().filter(|p| p.is_quality_knob) {
             let values = KNOB_VALUES.iter().filter(|(id, _)| *id == knob.id);
             for &value in values.flat_map(|(_, values)| *values) {
-                let mut params = Params::defaults(method.info().params);
+                let mut params = candidate.params.clone();
                 params.set(knob, value)?;
                 let measured = self.measure(renderer, method, &params)?;
                 settings.push(Setting { knob: knob.id, value: value.to_owned(), measured });

@@ -109,6 +109,8 @@ pub struct ExecuteReport {
     pub rays_ms: Option<f64>,
     /// What could not be shown, a sentence each.
     pub notes: Vec<String>,
+    /// Of all searches together.
+    pub steps: Option<u64>,
 }
 
 /// Something that executes plans. It keeps its memory between frames.

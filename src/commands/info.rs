@@ -65,10 +65,13 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
     let mut methods = Vec::new();
     for method in METHODS {
         let info = method.info();
-        let refusal = method.qualify(scene, &Params::defaults(info.params)).err();
-        let verdict = refusal.as_ref().map_or("can draw it".to_owned(), ToString::to_string);
-        say!("  method {}: {verdict}", info.id);
-        methods.push(json!({ "id": info.id, "refusal": refusal.map(|e| e.to_string()) }));
+        let (facts, refusal) = match method.qualify(scene, &Params::defaults(info.params)) {
+            Ok(facts) => (facts, None),
+            Err(error) => (Vec::new(), Some(error.to_string())),
+        };
+        say!("  method {}: {}", info.id, refusal.as_deref().unwrap_or("can draw it"));
+        facts.iter().for_each(|fact| say!("    {fact}"));
+        methods.push(json!({ "id": info.id, "refusal": refusal, "facts": facts }));
     }
     let times = scene.times;
     say!(

@@ -72,7 +72,7 @@ pub(crate) struct PlaceArgs {
     #[arg(long, value_name = "FILE|NAME")]
     pub(crate) mirror: Vec<String>,
     /// What stands for a mirror where a method needs a closed, star-shaped one (estalella, roger-holzschuch): a mesh file in
-    /// the mirror's own space, or a built-in shape, made as large as the mirror; repeatable, in the mirrors' order
+    /// the mirror's own space, or a built-in shape, made as large as the mirror; repeatable, in the mirrors' order ("none" leaves one out)
     #[arg(long, value_name = "FILE|NAME")]
     proxy: Vec<String>,
     /// Object: a mesh file, used as placed, or a built-in shape; repeatable

@@ -286,6 +286,7 @@ impl Subject<'_> {
             "projections": report.projections,
             "valid": report.valid,
             "valid_share": report.valid_share(),
+            "mean_steps": report.mean_steps(),
             "mirror_pixels": report.mirror_pixels,
             "covered_pixels": report.covered_pixels,
             "notes": report.notes,
@@ -340,7 +341,8 @@ fn print(output: &Path, ready: &Ready, report: &FrameReport) {
         let valid = share.map_or(String::new(), |share| format!(", {:.1} % valid", share * 100.0));
         say!("  {cameras} cameras, {batches} batches, {projections} projections{valid}");
     } else if let (Some(searched), Some(reflected)) = (report.projections, report.valid) {
-        say!("  {searched} points searched for, {reflected} reflected");
+        let steps = report.mean_steps().unwrap_or(0.0);
+        say!("  {searched} points searched for in {steps:.1} steps each, {reflected} reflected");
     }
     let stages = [
         ("visibility", report.ids_ms),

@@ -1,7 +1,7 @@
 //! The planes of a picture as one multi-layer EXR.
 //!
 //! One part with float channels `R`, `G`, `B` (the reflection), `P.X/Y/Z`, `N.X/Y/Z`, `lambda`, `splat.X/Y`,
-//! `coverage` and UINT channels `mirror`, `mirror_triangle`, `object`, `surfel`, `images` (0xFFFFFFFF = none),
+//! `coverage` and UINT channels `mirror`, `mirror_triangle`, `object`, `surfel`, `images`, `steps` (0xFFFFFFFF = none),
 //! `reason`. The dots make layers, as EXR tools understand them. The string vector [`NAMES`] holds the objects' names by index.
 
 use std::collections::BTreeMap;
@@ -32,6 +32,7 @@ const MIRROR_TRIANGLE: &str = "mirror_triangle";
 const OBJECT: &str = "object";
 const SURFEL: &str = "surfel";
 const IMAGES: &str = "images";
+const STEPS: &str = "steps";
 const REASON: &str = "reason";
 
 /// Lossless, and the same bytes for any thread count. Run lengths take a sixth of the time of deflate here, and
@@ -81,6 +82,7 @@ pub fn write_aov(path: &Path, planes: &Planes, object_names: &[String]) -> Resul
         (OBJECT, &planes.object),
         (SURFEL, &planes.surfel),
         (IMAGES, &planes.images),
+        (STEPS, &planes.steps),
         (REASON, &planes.reason),
     ] {
         channels.add(name, FlatSamples::U32(plane.clone()));
@@ -153,6 +155,7 @@ pub fn read_aov(path: &Path) -> Result<(Planes, Vec<String>)> {
         object: planes.integers(OBJECT)?,
         surfel: planes.integers(SURFEL)?,
         images: planes.integers(IMAGES)?,
+        steps: planes.integers(STEPS)?,
         reason: planes.integers(REASON)?,
     };
     Ok((planes, names))
@@ -277,6 +280,7 @@ mod tests {
             &mut planes.object,
             &mut planes.surfel,
             &mut planes.images,
+            &mut planes.steps,
             &mut planes.reason,
         ] {
             plane.iter_mut().for_each(|v| *v = next());

@@ -106,6 +106,14 @@ pub fn write_picture(path: &Path, picture: &Picture) -> Result<()> {
     write_bytes(path, &bytes)
 }
 
+/// A picture as the bytes of a PNG file.
+///
+/// # Errors
+/// It could not be encoded.
+pub fn png(picture: &Picture) -> Result<Vec<u8>> {
+    encode_png(picture).map_err(|error| output_error(Path::new("a picture"), error))
+}
+
 /// Reads a picture: PNG (sRGB, decoded to linear; alpha and colour profiles are ignored), EXR (channels R, G, B
 /// of its first layer that has them) or HDR. The format is told by the content.
 ///

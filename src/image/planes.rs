@@ -45,6 +45,8 @@ pub struct Planes {
     pub surfel: Vec<u32>,
     /// Images of the winning surfel in its camera, or [`NONE`].
     pub images: Vec<u32>,
+    /// Steps of the search for what is shown, or [`NONE`].
+    pub steps: Vec<u32>,
     /// [`Reason`] as a number.
     pub reason: Vec<u32>,
 }
@@ -67,6 +69,7 @@ impl Planes {
             object: vec![NONE; n],
             surfel: vec![NONE; n],
             images: vec![NONE; n],
+            steps: vec![NONE; n],
             reason: vec![Reason::NotMirror as u32; n],
         }
     }

@@ -113,12 +113,12 @@ pub trait Method: Send + Sync {
         scene.version
     }
 
-    /// Whether the method can draw this scene.
+    /// Whether the method can draw this scene, and what it found out about that, a sentence each.
     ///
     /// # Errors
     /// Says why not.
-    fn qualify(&self, _scene: &PreparedScene, _params: &Params) -> Result<()> {
-        Ok(())
+    fn qualify(&self, _scene: &PreparedScene, _params: &Params) -> Result<Vec<String>> {
+        Ok(Vec::new())
     }
 
     /// Makes what only depends on the scene.

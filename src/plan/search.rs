@@ -9,6 +9,17 @@ use super::SplatShape;
 use crate::camera::Eye;
 use crate::camera::reflector::{ReflectorMap, estalella};
 
+/// Which way a surface is curved, seen from the mirror side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bend {
+    /// Outward everywhere, or flat: every point has one image.
+    Convex,
+    /// Inward everywhere.
+    Concave,
+    /// Both, or as a saddle.
+    Mixed,
+}
+
 /// A star-shaped part of a mirror.
 #[derive(Clone, Debug)]
 pub struct ReflectorPart {
@@ -22,6 +33,8 @@ pub struct ReflectorPart {
     pub center: Vec3,
     /// In the mirror's local space, about `center`.
     pub map: ReflectorMap,
+    /// What of a point's images can be found.
+    pub bend: Bend,
 }
 
 /// How reflection points are found.

@@ -36,6 +36,8 @@ pub struct Request {
 }
 
 /// A mirror stands at the origin with this bounding-box diagonal.
+/// As `--proxy`: this mirror has none.
+const NO_PROXY: &str = "none";
 const MIRROR_DIAGONAL: f64 = 2.0;
 /// Objects have this bounding-box diagonal, and the first stands here.
 const OBJECT_DIAGONAL: f64 = 1.2;
@@ -84,6 +86,9 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
             let problem = format!("there are more of them than mirrors ({count})");
             return Err(Error::input("--proxy", "", problem, "give one a mirror at most"));
         };
+        if input == NO_PROXY {
+            continue;
+        }
         mirror.proxy = Some(library.proxy(input, &mirror.mesh, |problem, remedy| {
             Error::input("--proxy", "", problem, format!("{remedy}; files end in .obj or .ply"))
         })?);

@@ -80,7 +80,7 @@ impl Folder {
 
     /// Runs the words of a line.
     fn run(&self, line: &str) -> Run {
-        self.finish(self.command(line.split_whitespace()))
+        self.finish(self.command(words(line)))
     }
 
     /// Runs a line that must succeed, without a word on standard error.
@@ -115,6 +115,18 @@ impl Folder {
         let (lines, own) = (err.lines().count(), err.contains("; "));
         assert!(own && lines == 1 || err.contains("--help"), "{line}: {err}");
     }
+}
+
+/// The words of a line; single quotes keep some together.
+fn words(line: &str) -> Vec<String> {
+    let mut words = Vec::new();
+    for (i, part) in line.split('\'').enumerate() {
+        match i % 2 {
+            0 => words.extend(part.split_whitespace().map(str::to_owned)),
+            _ => words.push(part.to_owned()),
+        }
+    }
+    words
 }
 
 /// What a run did.

@@ -75,6 +75,98 @@ fn scene_files_name_stand_ins() {
 }
 
 #[test]
+fn what_is_known_of_a_mirror_is_said() {
+    let folder = Folder::new();
+    for (mirror, expected) in [
+        ("sphere", "sphere is star-shaped and convex"),
+        ("bowl", "bowl is star-shaped and concave: "),
+        ("wave", "wave is star-shaped and curved both ways: "),
+    ] {
+        let line = format!("info --mirror {mirror} --object knot --surfels 1000 --json f.json");
+        assert!(folder.good(&line).out.contains(expected));
+        let methods = folder.json("f.json")["methods"].clone();
+        let roger = methods.as_array().unwrap().iter().find(|m| m["id"] == "roger-holzschuch");
+        assert!(roger.unwrap()["facts"][0].as_str().unwrap().starts_with(expected));
+    }
+    let draw = |rest: &str| {
+        folder.good(&format!("render --object knot {SMALL} --method estalella {rest}"))
+    };
+    let out = draw("--mirror wave").out;
+    assert!(out.contains("note: wave is curved both ways: of several images"), "{out}");
+    let out = draw("--mirror torus --proxy sphere").out;
+    assert!(out.contains("note: the proxy of torus is up to "), "{out}");
+    let out = draw("--mirror sphere --proxy sphere").out;
+    assert!(!out.contains("proxy"), "{out}");
+    let out = draw("--mirror sphere --primitive points --grid 0.1").out;
+    assert!(out.contains("note: --grid and --tessellate are for triangles"), "{out}");
+    let two = "--mirror sphere --mirror torus --proxy none --proxy ellipsoid";
+    assert!(draw(two).out.contains("the proxy of torus"));
+    let line = format!("render --object knot {SMALL} --method estalella");
+    folder.refused(
+        &format!("{line} --mirror sphere --proxy torus"),
+        &["the proxy of mirror sphere: is not star-shaped", "give another"],
+    );
+    folder.refused(
+        &format!("{line} --mirror sphere --point square1"),
+        &["--point: says how surfels are drawn, not triangles; add --primitive points"],
+    );
+}
+
+/// Steps of searches: in the figures, and by pixel.
+#[test]
+fn steps_are_counted() {
+    let folder = Folder::new();
+    let line = |rest: &str| {
+        format!("render {BALL} {SMALL} --method roger-holzschuch {rest} --json f.json --aov a.exr")
+    };
+    let mean = |rest: &str| {
+        folder.good(&line(rest));
+        folder.json("f.json")["mean_steps"].as_f64().unwrap()
+    };
+    assert!((3.0..15.0).contains(&mean("")), "{}", mean(""));
+    assert!((mean("--early-exit off --iterations 7") - 7.0).abs() < 1e-9);
+    let (planes, _) = catoptric::image::aov::read_aov(&folder.path("a.exr")).unwrap();
+    let shown = planes.steps.iter().zip(&planes.object).filter(|(_, o)| **o != u32::MAX);
+    assert!(shown.clone().count() > 50 && shown.clone().all(|(&steps, _)| steps == 7));
+    folder.good(&format!("render {BALL} {SMALL} --json f.json"));
+    assert!(folder.json("f.json")["mean_steps"].is_null());
+}
+
+#[test]
+fn chosen_settings_are_compared() {
+    let folder = Folder::new();
+    let line = |with: &[&str]| {
+        let with: Vec<String> = with.iter().map(|with| format!("--with '{with}'")).collect();
+        let with = with.join(" ");
+        format!(
+            "bench methods {BALL} {SMALL} --spp 2 --repeat 1 --frames 0 -o found --steps --backend cpu {with}"
+        )
+    };
+    let settings = ["c3rc --detail 1", "estalella --grid 0.2"];
+    let out = folder.good(&line(&settings)).out;
+    assert!(out.contains("| estalella --grid 0.2 | cpu |"), "{out}");
+    let methods = folder.json("found/methods.json")["methods"].clone();
+    assert_eq!(methods[1]["label"], "estalella --grid 0.2");
+    assert_eq!(methods[1]["picture"], "estalella-grid-0.2.png");
+    assert!(methods[1]["mean_steps"].as_f64().is_some_and(|n| n > 0.5));
+    assert_eq!(methods[0]["settings"], serde_json::json!([]));
+    folder.write("found/own.png", "mine");
+    // Another run leaves no picture of this one, and what is not its own.
+    folder.good(&line(&["raytrace"]));
+    assert!(!folder.path("found/estalella-grid-0.2.png").exists());
+    assert!(folder.path("found/own.png").exists() && folder.path("found/raytrace.png").exists());
+    for (with, expected) in [
+        ("estalella --grid", "--with \"estalella --grid\": a value is required"),
+        ("pinhole", "--method: there is no method \"pinhole\""),
+        ("", "--with \"\": is empty; give a method"),
+        ("c3rc --grid 1", "--grid: c3rc has no such parameter"),
+        ("c3rc --frames 1", "unexpected argument '--frames'"),
+    ] {
+        folder.refused(&line(&[with]), &[expected]);
+    }
+}
+
+#[test]
 fn all_methods_are_compared() {
     let folder = Folder::new();
     let run = folder.good(&format!(

@@ -1,10 +1,12 @@
 //! The vertex-search methods and environment mapping, held against ray tracing.
 
 use catoptric::Context;
+use catoptric::analysis::methods::{Candidate, Effort, compare_methods};
+use catoptric::backend::{Backend, cpu::Cpu};
 use catoptric::frame::Renderer;
 use catoptric::geometry::Similarity;
 use catoptric::image::{Picture, Planes};
-use catoptric::methods::{Params, method};
+use catoptric::methods::{Method, Params, method};
 use catoptric::scene::PreparedScene;
 use catoptric::scene::description::Scene;
 use glam::DVec3;
@@ -80,6 +82,37 @@ fn reflected_meshes_are_where_rays_see_them() {
     let found = shown(&scene, "environment", &[]).1;
     let (wrong, apart) = (wrong(&found, &truth), apart(&found, &truth));
     assert!(wrong > 0.05 && apart > 0.1, "environment: {wrong} wrong, {apart} apart");
+}
+
+/// What touches a mirror is far from where a map from the middle shows it, and close to where the cameras do.
+#[test]
+fn environment_mapping_displaces_what_touches() {
+    let ball = object(
+        "ball",
+        shape("sphere", 3_000),
+        Similarity { scale: 0.3, ..moved(DVec3::new(1.18, 0.0, 0.546)) },
+        RED,
+    );
+    let mirror = (shape("sphere", 8_000), Similarity::IDENTITY);
+    let described = scene(mirror, vec![ball], looks(DVec3::new(0.0, 0.6, 5.0), DVec3::ZERO));
+    let scene = prepared(&described, 100_000);
+    let candidates = Candidate::all(false).into_iter();
+    let candidates: Vec<Candidate> =
+        candidates.filter(|c| ["c3rc", "environment"].contains(&c.label.as_str())).collect();
+    let effort = Effort { spp: 4, repeat: 1, frames: 0, orbit: 0.0 };
+    let eye = eye(&scene, 640, 480);
+    let cpu = |_: usize, _: &dyn Method| Ok(Box::new(Cpu::default()) as Box<dyn Backend>);
+    let cx = Context::default();
+    let (_, entries) =
+        compare_methods(&described, &scene, &eye, candidates, effort, &cpu, &cx).unwrap();
+    let px = |i: usize| {
+        let drawn = entries[i].result.as_ref().unwrap();
+        drawn.displacement_px.unwrap()
+    };
+    let (cameras, map) = (px(0), px(1));
+    eprintln!("c3rc {cameras:?}, environment {map:?}");
+    assert!(map.median >= 10.0 * cameras.median && cameras.median < 0.5, "{cameras:?} {map:?}");
+    assert!(map.p95 >= 10.0 * cameras.p95, "{cameras:?} {map:?}");
 }
 
 #[test]

@@ -97,10 +97,10 @@ fn outside(p: vec3<f32>) -> f32 {
 
 /// Whether a point is in the hidden region.
 fn hides(point: vec3<f32>) -> bool {
-    var least = outside(point);
     if task.inward != 0u {
-        return least > 0.0;
+        return false;
     }
+    var least = outside(point);
     let sight = point - task.eye;
     var at = 1.0;
     for (var k = 1u; k < SIGHT_SAMPLES; k += 1u) {

@@ -87,11 +87,7 @@ impl Backend for Cpu {
                 Pass::Search(pass) => {
                     let done = search::search(pass, scene, visibility, &search::by_cpu, out)?;
                     add(&mut report.passes_ms, milliseconds(start));
-                    add(&mut report.project_ms, done.search_ms);
-                    add(&mut report.splat_ms, done.draw_ms);
-                    report.projections = Some(done.searched);
-                    report.valid = Some(done.reflected);
-                    report.notes.extend(done.notes);
+                    done.enter(&mut report);
                 }
             }
         }

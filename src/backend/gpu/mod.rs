@@ -282,11 +282,7 @@ impl Ready {
                     let find = |job: &Job<'_>| searcher.borrow_mut().find(&self.gpu, job);
                     let done = search(pass, scene, visibility, &find, out)?;
                     report.passes_ms = Some(milliseconds(start));
-                    report.project_ms = Some(done.search_ms);
-                    report.splat_ms = Some(done.draw_ms);
-                    report.projections = Some(done.searched);
-                    report.valid = Some(done.reflected);
-                    report.notes.extend(done.notes);
+                    done.enter(&mut report);
                     self.is_here = false;
                 }
                 Pass::Lookup(pass) => {

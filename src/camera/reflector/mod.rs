@@ -75,14 +75,15 @@ impl ReflectorMap {
     }
 
     /// Whether a point is in the hidden region (Estalella et al. section 6.1): the reflector is between it and the eye, or it is
-    /// beyond the reflector's surface. Of a hollow mirror, whose opening the map does not know, only the latter counts.
+    /// beyond the reflector's surface. Of a hollow mirror, whose opening the map does not know, only what is found tells:
+    /// see [`Self::settled`].
     pub fn hides(&self, eye: Vec3, point: Vec3) -> bool {
         // How far outside the surface, as a share of the radius.
         let outside = |p: Vec3| p.length() / self.radius(p) - 1.0;
-        let here = outside(point);
         if self.inward {
-            return here > 0.0;
+            return false;
         }
+        let here = outside(point);
         let along = |t: f32| outside(eye + (point - eye) * t);
         let (mut least, mut at) = (here, 1.0);
         for k in 1..SIGHT_SAMPLES {
@@ -101,6 +102,12 @@ impl ReflectorMap {
             step *= 0.5;
         }
         least < 0.0
+    }
+
+    /// What was found for a point; a hollow mirror hides what is behind the tangent plane at its image.
+    pub fn settled(&self, found: Found, point: Vec3) -> Found {
+        let hidden = if self.inward { found.height(point) <= 0.0 } else { found.hidden };
+        Found { hidden, ..found }
     }
 
     /// The radius in a direction of any length.

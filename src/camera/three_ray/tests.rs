@@ -3,6 +3,7 @@
 mod caustics;
 mod counts;
 mod mirrors;
+mod slope;
 mod subdivision;
 mod theorem;
 

@@ -7,14 +7,19 @@ use catoptric::backend::Backend;
 use catoptric::backend::cpu::Cpu;
 use catoptric::camera::Eye;
 use catoptric::methods::{Method, Params, method};
-use catoptric::scene::PreparedScene;
+use catoptric::scene::arrange::{self, Request};
+use catoptric::scene::description::Scene;
+use catoptric::scene::prepared::PrepareOptions;
+use catoptric::scene::{PreparedScene, builtin};
 use catoptric::{Context, Error};
 use clap::{ArgMatches, Args};
 use serde_json::json;
 
 use super::super::render::{HowArgs, figures, where_it_ran};
 use super::super::{SceneArgs, check_json, chosen_method, ms, say, write_json};
-use super::report;
+use super::report::{self, Block, Section, Table};
+use super::run::{Bench, c3rc, params};
+use super::tables::frame_figures;
 
 /// See [`super::What::Layer`].
 #[derive(Args, Debug)]
@@ -115,5 +120,84 @@ pub(super) fn against_rays(
         rays_ms: rays.total().expect(all),
         ratio: layer.ratio().expect(all),
         layer,
+    })
+}
+
+/// What the layer is drawn with, from fast to exact.
+const QUALITIES: [&str; 3] = ["draft", "default", "best"];
+
+/// The layer by every quality against one ray a pixel, on the built-in scenes or the given one.
+pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
+    let place = &bench.args.place;
+    let given = !(place.inputs.is_empty() && place.mirror.is_empty() && place.object.is_empty());
+    let scenes: Vec<(Scene, usize)> = if given {
+        vec![(arrange::scene(&place.request(), &bench.silent())?, bench.pick(3_000_000, 300_000))]
+    } else {
+        let counts = bench.pick([3_000_000, 3_000_000, 437_000], [300_000, 300_000, 147_000]);
+        let named = |(name, count): (&&str, usize)| {
+            let request = Request { inputs: vec![(*name).to_owned()], ..place.request() };
+            Ok((arrange::scene(&request, &bench.silent())?, count))
+        };
+        builtin::SCENES.iter().zip(counts).map(named).collect::<catoptric::Result<_>>()?
+    };
+    let head = [
+        "scene",
+        "surfels",
+        "quality",
+        "layer ms",
+        "1 ray, ms",
+        "layer by rays",
+        "projections",
+        "valid %",
+    ];
+    let mut table = Table::new("The reflected layer against one ray a pixel", &head);
+    let mut list = Vec::new();
+    for (i, (described, count)) in scenes.iter().enumerate() {
+        let part = bench.turn(i, scenes.len());
+        part.step(0.0)?;
+        let leaf = PrepareOptions::default().tree.leaf_points;
+        let scene = part.prepared(described, part.surfels(*count), leaf)?;
+        let eye = place.eye(&scene)?;
+        let rays = method("raytrace").expect("it is in the registry");
+        let mut stages = [
+            Stage::new(&scene, &eye, part.backend()?),
+            Stage::new(&scene, &eye, Box::new(Cpu::default())),
+        ];
+        let cx = part.silent();
+        let one = Side::new(&stages, 1, rays, params(rays, "", &[]), &cx)?;
+        let own = |quality| Side::new(&stages, 0, c3rc(), params(c3rc(), quality, &[]), &cx);
+        let sides: catoptric::Result<Vec<Side>> = QUALITIES.into_iter().map(own).collect();
+        let sides = sides?;
+        let measuring = part.part(0.3, 1.0);
+        let step = |done| measuring.step(done);
+        let (one, timed) = against(&mut stages, &one, &sides, part.rounds(), step)?;
+        for (quality, timed) in QUALITIES.iter().zip(&timed) {
+            let report = timed.report();
+            table.row(vec![
+                described.name.clone(),
+                scene.surfel_count().to_string(),
+                (*quality).to_owned(),
+                report::median(timed.total()),
+                report::median(one.total()),
+                report::times(timed.ratio()),
+                report.projections.map_or("–".into(), |n| n.to_string()),
+                report.valid_share().map_or("–".into(), |v| report::number(100.0 * v)),
+            ]);
+            let mut value = frame_figures(timed);
+            value["scene"] = json!(described.name);
+            value["surfels"] = json!(scene.surfel_count());
+            value["quality"] = json!(quality);
+            value["rays_ms"] = report::quantity(one.total());
+            value["ratio"] = report::ratio(timed.ratio());
+            list.push(value);
+        }
+    }
+    let note = "The layer of c3rc is everything from the list of visible triangles to resolved colours; the rays are those of the \
+                same pixels. Neither includes visibility, environment or composition. Below 1 the layer is faster.";
+    Ok(Section {
+        id: "layer",
+        title: format!("The layer against rays ({} x {})", place.size.width, place.size.height),
+        blocks: vec![Block::Text(note.to_owned()), Block::Table(table)],
+        figures: json!({ "size": [place.size.width, place.size.height], "rows": list }),
     })
 }

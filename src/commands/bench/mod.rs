@@ -3,6 +3,8 @@
 //! Data flows one way: a scene is prepared, `analysis::measure` lets its sides take turns, a bench makes a
 //! [`report::Section`] of what they took, and `report` writes it.
 
+mod agree;
+mod all;
 mod balance;
 mod crossover;
 mod curve;
@@ -16,6 +18,7 @@ mod tables;
 use catoptric::Context;
 use clap::{ArgMatches, Args, Subcommand};
 
+pub(crate) use all::Kept;
 use run::{RunArgs, single};
 
 /// Measure, as ratios within one run
@@ -59,6 +62,13 @@ enum What {
     /// The paper conjectures that cameras pay where a mirror triangle covers enough pixels. For the scenes knot and room (or
     /// the given one) this measures where, against 1, 4 and 16 rays a pixel.
     Crossover(RunArgs),
+    /// All of these in one report: report.html (one self-contained page), report.md, report.json and plots as SVG
+    ///
+    /// Writes the report anew after each section, so that Ctrl-C keeps what is done. --quick takes some minutes and says where
+    /// the trends are; without it the figures can be quoted, if the machine had nothing else to do (the report says so).
+    All(RunArgs),
+    /// Whether two runs agree: their ratios side by side
+    Agree(agree::AgreeArgs),
 }
 
 pub(crate) fn run(args: &BenchArgs, matches: &ArgMatches, cx: &Context) -> anyhow::Result<()> {
@@ -69,5 +79,7 @@ pub(crate) fn run(args: &BenchArgs, matches: &ArgMatches, cx: &Context) -> anyho
         What::Balance(args) => single(args, cx, balance::section),
         What::Growth(args) => single(args, cx, growth::section),
         What::Crossover(args) => single(args, cx, crossover::section),
+        What::All(args) => all::run(args, cx),
+        What::Agree(args) => agree::run(args),
     }
 }

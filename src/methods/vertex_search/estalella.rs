@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::grid::grid;
 use super::{
     MAP_SIDE, MAP_TRIANGLES, POINT, PRIMITIVE, TESSELLATE, made, primitive, qualify, reflectors,
+    unused,
 };
 use crate::camera::reflector::estalella::Ends;
 use crate::context::Context;
@@ -77,7 +78,7 @@ impl Method for Estalella {
         &INFO
     }
 
-    fn qualify(&self, scene: &PreparedScene, params: &Params) -> Result<()> {
+    fn qualify(&self, scene: &PreparedScene, params: &Params) -> Result<Vec<String>> {
         qualify(scene, params)
     }
 
@@ -102,6 +103,7 @@ impl Method for Estalella {
         let ends =
             Ends { iterations: params.integer("iterations"), epsilon: params.number("epsilon") };
         out.notes.extend_from_slice(&made(maps).notes);
+        out.notes.extend(unused(params));
         out.passes.push(Pass::Search(Box::new(SearchPass {
             eye: frame.eye,
             parts: Arc::clone(&made(maps).parts),

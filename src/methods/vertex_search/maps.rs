@@ -29,6 +29,7 @@ pub(super) fn reflector(
         triangles: first + shape.triangles.start..first + shape.triangles.end,
         center,
         map: ReflectorMap::new(side, &surface, shape.center.inward),
+        bend: shape.bend,
     }
 }
 

@@ -1,6 +1,7 @@
 //! What the two vertex-search methods share: reflectors are found in mirrors and mapped once, then vertices or surfels are
 //! searched for on them.
 
+mod bend;
 mod center;
 mod estalella;
 mod grid;
@@ -19,7 +20,7 @@ use super::{Made, ParamInfo, ParamKind, Params, Value};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::plan::SplatShape;
-use crate::plan::search::{Grid, Primitive, ReflectorPart};
+use crate::plan::search::{Bend, Grid, Primitive, ReflectorPart};
 use crate::scene::prepared::PreparedScene;
 
 /// What the searches make once a scene.
@@ -76,6 +77,15 @@ const TESSELLATE: ParamInfo = ParamInfo {
     is_quality_knob: true,
 };
 
+/// Says so where surfels leave parameters of triangles without use.
+fn unused(params: &Params) -> Option<String> {
+    let triangles = ["grid", "tessellate"];
+    let given =
+        triangles.iter().any(|id| matches!(params.get(id), Some(Value::Number(n)) if n > 0.0));
+    (params.choice("primitive") == "points" && given)
+        .then(|| "--grid and --tessellate are for triangles: every surfel is searched for".into())
+}
+
 fn primitive(params: &Params) -> Primitive {
     if params.choice("primitive") == "points" {
         let one = params.choice("point") == "square1";
@@ -85,11 +95,37 @@ fn primitive(params: &Params) -> Primitive {
     Primitive::Triangles { longest_px: if px > 0.0 { px } else { f32::INFINITY } }
 }
 
-/// Whether some part of every mirror can be searched on.
-fn qualify(scene: &PreparedScene, params: &Params) -> Result<()> {
-    (0..scene.mirrors.len()).try_for_each(|mirror| {
-        parts::shapes(scene, mirror, params.integer("map-triangles")).map(|_| ())
-    })
+/// Whether some part of every mirror can be searched on, and what is known of each.
+fn qualify(scene: &PreparedScene, params: &Params) -> Result<Vec<String>> {
+    if params.choice("primitive") == "triangles" && params.choice("point") != "square2" {
+        let remedy = "add --primitive points";
+        return Err(Error::input(
+            "--point",
+            "",
+            "says how surfels are drawn, not triangles",
+            remedy,
+        ));
+    }
+    let mut facts = Vec::new();
+    for mirror in 0..scene.mirrors.len() {
+        let (shapes, others) = parts::shapes(scene, mirror, params.integer("map-triangles"))?;
+        for shape in shapes {
+            let bend = match shape.bend {
+                Bend::Convex => "convex",
+                Bend::Concave => "concave: far points have several images, of which one is drawn",
+                Bend::Mixed => {
+                    "curved both ways: points may have several images, of which one is drawn"
+                }
+            };
+            facts.push(format!("{} is star-shaped and {bend}", shape.name));
+        }
+        facts.extend(others.iter().map(|name| not_shown(name)));
+    }
+    Ok(facts)
+}
+
+fn not_shown(part: &str) -> String {
+    format!("{part} is not star-shaped: it shows the environment only")
 }
 
 /// Maps the reflectors of all mirrors.
@@ -104,15 +140,42 @@ fn reflectors(
         let (shapes, others) = parts::shapes(scene, mirror, params.integer("map-triangles"))?;
         for shape in shapes {
             cx.step("mapping reflectors", mirror as f64 / scene.mirrors.len() as f64)?;
-            list.push(maps::reflector(scene, mirror, &shape, params.integer("map-side")));
+            let part = maps::reflector(scene, mirror, &shape, params.integer("map-side"));
+            notes.extend(misfit(scene, mirror, &part));
+            if part.bend == Bend::Mixed {
+                let name = &part.name;
+                notes.push(format!(
+                    "{name} is curved both ways: of several images of a point one is drawn"
+                ));
+            }
+            list.push(part);
         }
-        notes.extend(
-            others
-                .into_iter()
-                .map(|name| format!("{name} is not star-shaped: it shows the environment only")),
-        );
+        notes.extend(others.iter().map(|name| not_shown(name)));
     }
     Ok(Arc::new(Reflectors { parts: Arc::new(list), grids: Arc::new(grids), notes }))
+}
+
+/// A stand-in that is farther than this from the mirror, as a share of its distance from the centre, is worth a note: facets
+/// are nearer.
+const MISFIT: f32 = 0.02;
+
+/// What is to be said of a proxy that is not where the mirror is.
+fn misfit(scene: &PreparedScene, mirror: usize, part: &ReflectorPart) -> Option<String> {
+    let own = &scene.mirrors[mirror];
+    own.proxy.as_ref()?;
+    let apart = own.mesh.positions().iter().map(|&p| {
+        let offset = p - part.center;
+        let radius = part.map.radius(offset);
+        (offset.length() - radius).abs() / radius.max(f32::MIN_POSITIVE)
+    });
+    let most = apart.fold(0.0, f32::max);
+    (most > MISFIT).then(|| {
+        format!(
+            "the proxy of {} is up to {:.0} % of its radius away from it: images are displaced",
+            own.name,
+            100.0 * most
+        )
+    })
 }
 
 /// What [`reflectors`] made.
@@ -122,7 +185,13 @@ fn made(made: &Made) -> &Reflectors {
 
 /// A mirror that no search works on.
 fn refused(scene: &PreparedScene, mirror: usize, problem: &str) -> Error {
-    let name = format!("mirror {}", scene.mirrors[mirror].name);
-    let remedy = "give a closed, star-shaped stand-in with --proxy, or use --method c3rc";
+    let own = &scene.mirrors[mirror];
+    let (name, remedy) = if own.proxy.is_some() {
+        let remedy = "give another, star-shaped one, or use --method c3rc";
+        (format!("the proxy of mirror {}", own.name), remedy)
+    } else {
+        let remedy = "give a closed, star-shaped stand-in with --proxy, or use --method c3rc";
+        (format!("mirror {}", own.name), remedy)
+    };
     Error::input(name, "", problem, remedy)
 }

@@ -4,10 +4,12 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::bend::bend;
 use super::center::{Center, center};
 use super::refused;
 use crate::error::Result;
 use crate::geometry::{Mesh, Similarity};
+use crate::plan::search::Bend;
 use crate::scene::builtin;
 use crate::scene::description::Source;
 use crate::scene::prepared::PreparedScene;
@@ -18,6 +20,7 @@ pub(super) struct Shape {
     /// Of the mirror, as drawn.
     pub(super) triangles: Range<u32>,
     pub(super) center: Center,
+    pub(super) bend: Bend,
     /// The mirror's local space.
     pub(super) corners: Vec<[Vec3; 3]>,
     /// Unit, at the corners.
@@ -41,6 +44,7 @@ pub(super) fn shapes(
                 name: piece.name,
                 triangles: piece.drawn,
                 center,
+                bend: bend(&piece.corners, &piece.normals),
                 corners: piece.corners,
                 normals: piece.normals,
             }),

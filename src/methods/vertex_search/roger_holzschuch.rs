@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{
     MAP_SIDE, MAP_TRIANGLES, POINT, PRIMITIVE, TESSELLATE, made, primitive, qualify, reflectors,
+    unused,
 };
 use crate::context::Context;
 use crate::error::Result;
@@ -65,7 +66,7 @@ impl Method for RogerHolzschuch {
         &INFO
     }
 
-    fn qualify(&self, scene: &PreparedScene, params: &Params) -> Result<()> {
+    fn qualify(&self, scene: &PreparedScene, params: &Params) -> Result<Vec<String>> {
         qualify(scene, params)
     }
 
@@ -86,6 +87,7 @@ impl Method for RogerHolzschuch {
     ) -> Result<()> {
         let px = if params.choice("early-exit") == "on" { EARLY_EXIT_PX } else { 0.0 };
         out.notes.extend_from_slice(&made(maps).notes);
+        out.notes.extend(unused(params));
         out.passes.push(Pass::Search(Box::new(SearchPass {
             eye: frame.eye,
             parts: Arc::clone(&made(maps).parts),

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::bend::bend;
 use super::center::center;
 use super::grid::grid;
 use super::maps::surface;
@@ -10,6 +11,7 @@ use crate::camera::reflector::exact::Surface;
 use crate::camera::reflector::tests::{ELLIPSOID, SPHERE, apart_px, cases};
 use crate::camera::reflector::{ReflectorMap, estalella, roger};
 use crate::geometry::Mesh;
+use crate::plan::search::Bend;
 use crate::scene::builtin;
 
 fn corners(mesh: &Mesh) -> Vec<[Vec3; 3]> {
@@ -43,6 +45,25 @@ fn star_shapes_have_a_centre() {
         assert_eq!(center(&corners(&mesh)), None, "{name}");
     }
     assert_eq!(center(&[]), None);
+}
+
+#[test]
+fn surfaces_are_convex_concave_or_both() {
+    for (name, expected) in [
+        ("sphere", Bend::Convex),
+        ("ellipsoid", Bend::Convex),
+        ("cube", Bend::Convex),
+        ("plane", Bend::Convex),
+        ("bowl", Bend::Concave),
+        ("wave", Bend::Mixed),
+        ("torus", Bend::Mixed),
+        ("goblet", Bend::Mixed),
+    ] {
+        let mesh = builtin::shape(name, None).unwrap();
+        let normals: Vec<[Vec3; 3]> =
+            mesh.triangles().iter().map(|t| t.map(|i| mesh.normals()[i as usize])).collect();
+        assert_eq!(bend(&corners(&mesh), &normals), expected, "{name}");
+    }
 }
 
 #[test]
@@ -100,6 +121,7 @@ fn vertices_are_found_on_maps_of_meshes() {
             name: "test".into(),
             triangles: 0..0,
             center: found,
+            bend: Bend::Convex,
             normals: mesh.triangles().iter().map(|t| t.map(normal)).collect(),
             corners,
         };

@@ -71,6 +71,7 @@ fn rows(probed: &Probed, scene: &Scene) -> Vec<(&'static str, String)> {
             ("λ", mirror.lambda.map(|l| format!("{l:.4}"))),
             ("surfel", mirror.surfel.map(|n| n.to_string())),
             ("images", mirror.images.map(|n| n.to_string())),
+            ("search steps", mirror.steps.map(|n| n.to_string())),
             ("at (world)", mirror.position.map(|p| format!("{:.3} {:.3} {:.3}", p.x, p.y, p.z))),
             ("coverage", mirror.coverage.map(|c| format!("{c:.2}"))),
         ];

@@ -59,6 +59,7 @@ pub(crate) struct Reflected {
     pub(crate) object: Option<usize>,
     pub(crate) surfel: Option<u32>,
     pub(crate) images: Option<u32>,
+    pub(crate) steps: Option<u32>,
     /// World space.
     pub(crate) position: Option<DVec3>,
     pub(crate) coverage: Option<f32>,
@@ -140,6 +141,7 @@ pub(super) fn probe(
             seen.object = known(planes.object[at]).map(|n| n as usize);
             seen.surfel = known(planes.surfel[at]);
             seen.images = known(planes.images[at]);
+            seen.steps = known(planes.steps[at]);
             seen.lambda = Some(planes.lambda[at]);
             seen.position = Some(Vec3::from(planes.position[at]).as_dvec3());
         }

@@ -22,6 +22,16 @@ pub(super) struct Image {
     pub(super) height: f32,
     /// From the reflection point, scene units.
     pub(super) distance: f32,
+    /// Of the search.
+    pub(super) steps: f32,
+}
+
+impl Image {
+    /// For the integer planes.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "few")]
+    pub(super) fn rounded_steps(&self) -> u32 {
+        self.steps.round() as u32
+    }
 }
 
 /// Where a part of a mirror is, and where it is seen from.
@@ -69,6 +79,7 @@ impl Place {
             place: self.scene(place),
             height: height * scale,
             distance: point.distance(found.point) * scale,
+            steps: found.steps as f32,
         }
     }
 }
@@ -110,6 +121,7 @@ impl<'a> Reflecting<'a> {
         let image = |(&p, f): (&Vec3, &Found)| place.image(place.local(p), f);
         let images: Vec<Image> = points.par_iter().zip(&found).map(image).collect();
         done.searched += points.len() as u64;
+        done.steps += found.par_iter().map(|found| u64::from(found.steps)).sum::<u64>();
         done.reflected += images.par_iter().filter(|image| image.height > 0.0).count() as u64;
         Ok(images)
     }

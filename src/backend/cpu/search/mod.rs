@@ -17,6 +17,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use self::images::Reflecting;
+use crate::backend::ExecuteReport;
 use crate::camera::reflector::{Found, estalella, roger};
 use crate::error::Result;
 use crate::plan::Reflection;
@@ -31,12 +32,26 @@ pub(crate) struct Done {
     pub(crate) searched: u64,
     /// Those that are reflected.
     pub(crate) reflected: u64,
+    /// Of all searches together.
+    pub(crate) steps: u64,
     /// Wall time of the searches, milliseconds.
     pub(crate) search_ms: f64,
     /// Wall time of drawing and shading, milliseconds.
     pub(crate) draw_ms: f64,
     /// What could not be shown, a sentence each.
     pub(crate) notes: Vec<String>,
+}
+
+impl Done {
+    /// Enters it into a report.
+    pub(crate) fn enter(self, report: &mut ExecuteReport) {
+        report.project_ms = Some(self.search_ms);
+        report.splat_ms = Some(self.draw_ms);
+        report.projections = Some(self.searched);
+        report.valid = Some(self.reflected);
+        report.steps = Some(self.steps);
+        report.notes.extend(self.notes);
+    }
 }
 
 /// One search on one reflector; everything relative to its centre, in its mirror's local space.
@@ -64,13 +79,14 @@ pub(crate) fn by_cpu(job: &Job<'_>) -> Result<Vec<Found>> {
     let map = &job.part.map;
     let find = |&point: &Vec3| {
         let hidden = map.hides(job.eye, point);
-        match job.search {
+        let found = match job.search {
             Search::Estalella(ends) => estalella::search(map, job.eye, point, hidden, ends),
             Search::Roger { iterations, px } => {
                 let ends = roger::Ends { iterations, angle: px * job.px };
                 Found { hidden, ..roger::search(map, job.eye, point, ends) }
             }
-        }
+        };
+        map.settled(found, point)
     };
     Ok(job.points.par_iter().with_min_len(CHUNK).map(find).collect())
 }

@@ -24,6 +24,7 @@ fn mix(a: &Corner, b: &Corner, t: f32) -> Corner {
             place: a.image.place + (b.image.place - a.image.place) * t,
             height: along(a.image.height, b.image.height),
             distance: along(a.image.distance, b.image.distance),
+            steps: along(a.image.steps, b.image.steps),
         },
         weights: [0, 1, 2].map(|k| along(a.weights[k], b.weights[k])),
     }

@@ -28,6 +28,8 @@ pub(super) fn draw(
     let size = visibility.size;
     let keys: Vec<AtomicU64> =
         (0..size.pixels()).into_par_iter().map(|_| AtomicU64::new(EMPTY)).collect();
+    // By surfel, if somebody asks.
+    let mut steps: Vec<u32> = Vec::new();
     for cloud in &scene.clouds[..scene.objects.len()] {
         let surfels: Vec<u32> = cloud.surfels.clone().collect();
         let place = |&i: &u32| {
@@ -35,6 +37,13 @@ pub(super) fn draw(
         };
         let positions: Vec<Vec3> = surfels.par_iter().map(place).collect();
         let images = reflecting.images(&positions, done)?;
+        if out.planes.is_some() {
+            steps.resize(cloud.surfels.end as usize, NONE);
+            surfels
+                .iter()
+                .zip(&images)
+                .for_each(|(&i, image)| steps[i as usize] = image.rounded_steps());
+        }
         surfels.par_iter().zip(&images).for_each(|(&surfel, image)| {
             let Some(px) = eye.project_px(image.place).filter(|_| image.height > 0.0) else {
                 return;
@@ -58,6 +67,9 @@ pub(super) fn draw(
             let surfel = u32::try_from(key & u64::from(u32::MAX)).unwrap_or(NONE);
             let distance = f32::from_bits(u32::try_from(key >> 32).unwrap_or(0));
             show(reflecting, pixel, surfel, distance, out);
+            if let Some(planes) = out.planes.as_deref_mut() {
+                planes.steps[pixel] = steps[surfel as usize];
+            }
         }
     }
     Ok(())

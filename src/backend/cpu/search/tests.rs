@@ -6,7 +6,7 @@ use super::images::Image;
 use super::pieces::{Piece, reflected_part, whole};
 
 fn image(x: f32, y: f32, height: f32) -> Image {
-    Image { place: Vec3::new(x, y, 0.0), height, distance: 1.0 + x }
+    Image { place: Vec3::new(x, y, 0.0), height, distance: 1.0 + x, steps: 3.0 }
 }
 
 fn area(piece: &Piece) -> f32 {

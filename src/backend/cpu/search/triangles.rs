@@ -94,7 +94,7 @@ fn by_grid(
     let corners: Vec<Vec3> = grid.corners.par_iter().map(place).collect();
     let images = reflecting.images(&corners, done)?;
     let between = |(corners, [x, y, z]): &([u32; 8], [f32; 3])| {
-        let none = Image { place: Vec3::ZERO, height: 0.0, distance: 0.0 };
+        let none = Image { place: Vec3::ZERO, height: 0.0, distance: 0.0, steps: 0.0 };
         (0..8).fold(none, |sum, k| {
             let along = |bit: usize, t: f32| if k >> bit & 1 == 1 { t } else { 1.0 - t };
             let weight = along(0, *x) * along(1, *y) * along(2, *z);
@@ -103,6 +103,7 @@ fn by_grid(
                 place: sum.place + image.place * weight,
                 height: sum.height + image.height * weight,
                 distance: sum.distance + image.distance * weight,
+                steps: sum.steps + image.steps * weight,
             }
         })
     };
@@ -202,7 +203,7 @@ pub(super) fn draw(
             let shown = meshes[object].show(&scene.objects[object], triangle, weights);
             let depth = |p: Vec3| (p - eye.position).dot(eye.forward);
             let hidden =
-                backs.get(pixel).is_some_and(|&back| depth(shown.place) > back * BACK_SLACK);
+                backs.get(pixel).is_some_and(|&back| depth(shown.image.place) > back * BACK_SLACK);
             (!hidden).then(|| Shown {
                 pixel,
                 object,
@@ -244,9 +245,8 @@ struct Shown {
     /// Over all objects.
     triangle: u32,
     weights: [f32; 3],
-    distance: f32,
-    /// Of the image, scene space.
-    place: Vec3,
+    /// Between those of the corners.
+    image: Image,
     radiance: Vec3,
 }
 
@@ -268,8 +268,12 @@ impl Mesh {
             object: 0,
             triangle,
             weights: own,
-            distance: mean(|image| image.distance),
-            place: (0..3).map(|k| images[k].place * weights[k]).sum(),
+            image: Image {
+                place: (0..3).map(|k| images[k].place * weights[k]).sum(),
+                height: mean(|image| image.height),
+                distance: mean(|image| image.distance),
+                steps: mean(|image| image.steps),
+            },
             radiance: Vec3::ZERO,
         }
     }
@@ -295,7 +299,8 @@ fn describe(reflecting: &Reflecting<'_>, shown: &Shown, out: &mut Reflection) {
         let (position, normal) = scene.surface_at(shown.triangle, shown.weights);
         planes.position[i] = (position.as_dvec3() + scene.origin).as_vec3().to_array();
         planes.normal[i] = normal.to_array();
-        planes.lambda[i] = shown.distance;
+        planes.lambda[i] = shown.image.distance;
+        planes.steps[i] = shown.image.rounded_steps();
         planes.object[i] = u32::try_from(shown.object).unwrap_or(NONE);
         planes.coverage[i] = 1.0;
         planes.reason[i] = Reason::Object as u32;

@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 use super::images::Reflecting;
 use crate::camera::three_ray::multiplicity::Jacobian;
 use crate::error::Result;
+use crate::plan::search::Bend;
 
 /// Vertices of an object that are looked at.
 const SAMPLE: usize = 256;
@@ -13,7 +14,7 @@ const SAMPLE: usize = 256;
 /// A sentence for each object that is not in one of the zones with a single image as a whole.
 pub(super) fn notes(reflecting: &Reflecting<'_>) -> Result<Vec<String>> {
     let mut notes = Vec::new();
-    if !reflecting.part.map.inward {
+    if reflecting.part.bend != Bend::Concave {
         return Ok(notes);
     }
     for object in &reflecting.scene.objects {

@@ -14,7 +14,7 @@ use crate::camera::reflector::exact::Surface;
 use crate::camera::reflector::tests::{Case, ELLIPSOID, SPHERE, apart_px, cases_of, map};
 use crate::camera::reflector::{Found, estalella};
 use crate::plan::EnvironmentCube;
-use crate::plan::search::{ReflectorPart, Search};
+use crate::plan::search::{Bend, ReflectorPart, Search};
 
 /// To its end: before, it depends on the eye how far it has come.
 const ESTALELLA: Search = Search::Estalella(estalella::Ends { iterations: 20, epsilon: 0.0 });
@@ -41,6 +41,7 @@ fn trial(surface: Surface, bars: [f64; 2]) -> Trial {
         triangles: 0..0,
         center: Vec3::ZERO,
         map: map(surface, false),
+        bend: Bend::Convex,
     };
     let cases = EYES.map(|eye| cases_of(surface, 5_000, |_| eye));
     Trial { parts: Arc::new(vec![part]), cases, bars }

@@ -9,7 +9,7 @@ use super::{Cell, EQUAL, Entry, Map, SETTINGS, SPP};
 use crate::commands::plots::{Axis, Dot, HeatMap, LinePlot, Series, heat_maps, lines, short};
 
 pub(super) const NOTE: &str = "Cameras (c3rc: draft, detail 1, default, best) and rays (1, 4, 16 a pixel) draw the same reflections; each is \
-    timed in turn with one ray a pixel. The error is the RMSE against many rays a pixel where objects are reflected. At equal error \
+    timed in turn with one ray a pixel. The error is the RMSE (linear, values above white as white) against many rays a pixel where objects are reflected. At equal error \
     counts the fastest setting of cameras whose error is at most 5 % above that of the rays; where there is none, cameras do not \
     reach that error, at whatever time. Below 1 cameras win. The paper conjectures a break-even in pixels per mirror triangle and \
     measured none.";

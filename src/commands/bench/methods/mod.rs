@@ -1,12 +1,16 @@
 //! `catoptric bench methods`: every method on one scene, held against many rays a pixel.
 
 mod plot;
+mod section;
 mod sheet;
+mod with;
+
+pub(super) use section::section;
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use catoptric::analysis::methods::{Drawn, Effort, Entry, Measured, compare_methods};
+use catoptric::analysis::methods::{Candidate, Drawn, Effort, Entry, Measured, compare_methods};
 use catoptric::image::compare::Percentiles;
 use catoptric::image::io::{write_bytes, write_picture};
 use catoptric::methods::Method;
@@ -46,7 +50,14 @@ pub(crate) struct MethodsArgs {
     /// The orbit, degrees
     #[arg(long, value_name = "DEGREES", default_value_t = 3.0, allow_negative_numbers = true)]
     orbit: f64,
-    /// Leave the methods' quality knobs alone: no plot of error against time
+    /// Compare this instead of all methods: a method and its flags in quotes, as in --with "estalella --grid 0.1";
+    /// repeatable
+    #[arg(long, value_name = "METHOD FLAGS")]
+    with: Vec<String>,
+    /// Add a row to the sheet: how many steps searches took
+    #[arg(long)]
+    steps: bool,
+    /// Leave the methods' quality knobs alone: one setting of each
     #[arg(long)]
     defaults: bool,
     /// Write the figures here, too
@@ -60,23 +71,29 @@ pub(crate) fn run(args: &MethodsArgs, cx: &Context) -> anyhow::Result<()> {
         return Err(Error::input("--orbit", "", "is not a number", "give degrees").into());
     }
     check_folder(&args.output)?;
+    let (candidates, hows): (Vec<_>, Vec<_>) =
+        args.with.iter().map(|text| with::candidate(text)).collect::<anyhow::Result<_>>()?;
+    let candidates =
+        if candidates.is_empty() { Candidate::all(!args.defaults) } else { candidates };
     let ready = args.scene.ready(None, cx)?;
     let effort = Effort {
         spp: args.spp,
         repeat: args.repeat,
         frames: args.frames,
         orbit: args.orbit.to_radians(),
-        knobs: !args.defaults,
     };
-    let how = |method: &dyn Method| {
+    let backend = |i: usize, method: &dyn Method| {
         // Rays are the CPU's: what has no shaders is not asked of a device.
         let backend = if method.info().has_shaders { args.backend.clone() } else { "cpu".into() };
         let adapter = args.adapter.clone().filter(|_| method.info().has_shaders);
-        let how = HowArgs { backend, adapter, ..HowArgs::standard() };
-        how.backend(method)
+        match hows.get(i) {
+            Some(how) if how.backend != "auto" || how.adapter.is_some() => how.backend(method),
+            _ => HowArgs { backend, adapter, ..HowArgs::standard() }.backend(method),
+        }
     };
+    let (scene, eye) = (&ready.scene, &ready.eye);
     let (reference, entries) =
-        compare_methods(&ready.described, &ready.scene, &ready.eye, effort, &how, cx)?;
+        compare_methods(&ready.described, scene, eye, candidates, effort, &backend, cx)?;
     cx.step("writing", 1.0)?;
     let figures = figures(&ready, args, &entries);
     let table = table(&ready, args, &entries);
@@ -85,22 +102,34 @@ pub(crate) fn run(args: &MethodsArgs, cx: &Context) -> anyhow::Result<()> {
         problem: e.to_string(),
     })?;
     let file = |name: &str| args.output.join(name);
-    write_picture(&file("sheet.png"), &sheet::sheet(&reference, &entries))?;
+    remove_pictures(&args.output);
+    write_picture(&file("sheet.png"), &sheet::sheet(&reference, &entries, args.steps))?;
     for entry in &entries {
         if let Ok(drawn) = &entry.result {
-            write_picture(&file(&format!("{}.png", entry.method.info().id)), &drawn.picture)?;
+            write_picture(&file(&with::file_name(&entry.candidate.label)), &drawn.picture)?;
         }
     }
     write_picture(&file("reference.png"), &reference.picture)?;
-    if !args.defaults {
-        write_bytes(&file("error-against-time.svg"), plot::errors(&entries)?.as_bytes())?;
-    }
+    write_bytes(&file("error-against-time.svg"), plot::errors(&entries)?.as_bytes())?;
     write_bytes(&file("methods.md"), table.as_bytes())?;
     write_json(Some(&file("methods.json")), &figures)?;
     write_json(args.json.as_ref(), &figures)?;
     say!("{}", table.trim_end());
     say!("Written to {}: sheet.png, methods.md, methods.json and more", args.output.display());
     Ok(())
+}
+
+/// Removes the pictures that an earlier run left in the folder, by its own list of them.
+fn remove_pictures(folder: &Path) {
+    let Ok(text) = std::fs::read(folder.join("methods.json")) else { return };
+    let Ok(figures) = serde_json::from_slice::<Value>(&text) else { return };
+    let methods = figures["methods"].as_array().into_iter().flatten();
+    for name in methods.filter_map(|method| method["picture"].as_str()) {
+        if Path::new(name).file_name().is_some_and(|own| own == name) {
+            // What cannot be removed is overwritten, or stays.
+            let _ = std::fs::remove_file(folder.join(name));
+        }
+    }
 }
 
 /// What a method's reflections took, milliseconds: cameras, searches or rays, and drawing; without the direct view.
@@ -113,17 +142,17 @@ fn table(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> String {
         "# Methods on {} ({} x {}), against {} rays a pixel\n\n\
          Errors are over the pixels that reflect objects. Times are medians of {} frames; `reflection` is everything but \
          visibility and the direct view. Displacement: how far what a pixel shows is from where it belongs.\n\n\
-         | method | runs on | reflection ms | projection ms | RMSE | PSNR dB | FLIP | missing % | displacement px, median / 95 % / 99 % | flicker |\n\
-         |---|---|---|---|---|---|---|---|---|---|\n",
+         | method | runs on | reflection ms | projection ms | steps | RMSE | PSNR dB | FLIP | missing % | displacement px, median / 95 % / 99 % | flicker |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|\n",
         ready.scene.name, ready.eye.size.width, ready.eye.size.height, args.spp, args.repeat
     );
     let number = |value: Option<f64>, digits: usize| {
         value.map_or("–".to_owned(), |value| format!("{value:.digits$}"))
     };
     for entry in entries {
-        let id = entry.method.info().id;
+        let id = &entry.candidate.label;
         let row = match &entry.result {
-            Err(error) => format!("| {id} | {error} ||||||||||"),
+            Err(error) => format!("| {id} | {error} |||||||||||"),
             Ok(drawn) => {
                 let Measured { report, errors } = &drawn.measured;
                 let missing = errors.objects.as_ref().map(|o| 100.0 * o.total.missing_share());
@@ -133,10 +162,11 @@ fn table(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> String {
                         format!("{median:.2} / {p95:.2} / {p99:.2}")
                     });
                 format!(
-                    "| {id} | {} | {} | {} | {:.4} | {} | {:.4} | {} | {px} | {} |",
+                    "| {id} | {} | {} | {} | {} | {:.4} | {} | {:.4} | {} | {px} | {} |",
                     where_it_ran(report),
                     number(own_ms(&drawn.measured), 1),
                     number(report.project_ms, 1),
+                    number(report.mean_steps(), 1),
                     errors.rmse,
                     number(errors.psnr, 1),
                     errors.flip,
@@ -147,13 +177,26 @@ fn table(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> String {
         };
         writeln!(text, "{row}").expect("strings grow");
     }
-    let notes = entries.iter().filter_map(|entry| Some((entry, entry.result.as_ref().ok()?)));
-    for (entry, drawn) in notes {
-        for note in &drawn.measured.report.notes {
-            writeln!(text, "\n{}: {note}.", entry.method.info().id).expect("strings grow");
-        }
+    for (note, labels) in notes(entries) {
+        writeln!(text, "\n{}: {note}.", labels.join(", ")).expect("strings grow");
     }
     text
+}
+
+/// Each note once, with what it is about.
+fn notes(entries: &[Entry]) -> Vec<(&str, Vec<&str>)> {
+    let mut list: Vec<(&str, Vec<&str>)> = Vec::new();
+    for entry in entries {
+        let Ok(drawn) = &entry.result else { continue };
+        for note in &drawn.measured.report.notes {
+            let label = entry.candidate.label.as_str();
+            match list.iter_mut().find(|(known, _)| known == note) {
+                Some((_, labels)) => labels.push(label),
+                None => list.push((note, vec![label])),
+            }
+        }
+    }
+    list
 }
 
 fn measured_figures(measured: &Measured) -> Value {
@@ -175,6 +218,7 @@ fn measured_figures(measured: &Measured) -> Value {
         },
         "projections": report.projections,
         "valid": report.valid,
+        "mean_steps": report.mean_steps(),
         "notes": report.notes,
         "pixels": errors.pixels,
         "rmse": errors.rmse,
@@ -209,7 +253,10 @@ fn figures(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> Value {
                 Ok(drawn) => drawn_figures(drawn),
                 Err(error) => json!({ "refused": error.to_string() }),
             };
-            value["method"] = json!(entry.method.info().id);
+            value["method"] = json!(entry.candidate.method.info().id);
+            value["label"] = json!(entry.candidate.label);
+            value["picture"] =
+                json!(entry.result.is_ok().then(|| with::file_name(&entry.candidate.label)));
             value
         })
         .collect();

@@ -37,29 +37,66 @@ fn window(reference: &Reference) -> Window {
     Window { at: low, size: [0, 1].map(|k| high[k].saturating_sub(low[k])) }
 }
 
-/// Columns: the reference, then each method; rows: the picture, and FLIP (black is equal, white is as different as can
-/// be).
-pub(super) fn sheet(reference: &Reference, entries: &[Entry]) -> Picture {
+/// Cells side by side at most.
+const COLUMNS: usize = 4;
+/// The map of steps is white at so many.
+const MOST_STEPS: f32 = 20.0;
+/// Of the scale below, pixels.
+const SCALE: [usize; 2] = [256, 10];
+
+/// Cells: the reference, then each candidate, with FLIP below (black is equal, white is as different as can be) and, if
+/// asked for, the steps of searches.
+pub(super) fn sheet(reference: &Reference, entries: &[Entry], steps: bool) -> Picture {
     let window = window(reference);
-    let columns = entries.len() + 1;
-    let [wide, high] = [window.size[0].max(160) + GAP, window.size[1] + GAP];
-    let mut out = Picture::black(pixels(columns * wide), pixels(LINE + 2 * high));
+    let maps = if steps { 2 } else { 1 };
+    let longest = entries.iter().map(|e| e.candidate.label.len()).max().unwrap_or(0);
+    let wide = window.size[0].max(8 * longest.max(18)) + GAP;
+    let high = window.size[1] + GAP;
+    let cell = [wide, LINE + (1 + maps) * high];
+    let rows = (entries.len() + 1).div_ceil(COLUMNS);
+    let columns = (entries.len() + 1).div_ceil(rows);
+    let mut out = Picture::black(pixels(columns * wide), pixels(rows * cell[1] + maps * LINE));
+    let corner = |k: usize| [k % columns * cell[0], k / columns * cell[1]];
+    let below = |[x, y]: [usize; 2], n: usize| [x, y + LINE + n * high];
+    let width = reference.picture.width as usize;
     write(&mut out, [GAP, 6], "reference");
-    paste(&mut out, [0, LINE], &reference.picture.rgb, reference.picture.width as usize, window);
+    paste(&mut out, below([0, 0], 0), &reference.picture.rgb, width, window);
     for (k, entry) in entries.iter().enumerate() {
-        let left = (k + 1) * wide;
-        write(&mut out, [left + GAP, 6], entry.method.info().id);
+        let at = corner(k + 1);
+        write(&mut out, [at[0] + GAP, at[1] + 6], &entry.candidate.label);
         let Ok(drawn) = &entry.result else {
-            write(&mut out, [left + GAP, LINE + 6], "cannot draw this");
+            write(&mut out, [at[0] + GAP, at[1] + LINE + 6], "cannot draw this");
             continue;
         };
-        let width = drawn.picture.width as usize;
-        paste(&mut out, [left, LINE], &drawn.picture.rgb, width, window);
+        paste(&mut out, below(at, 0), &drawn.picture.rgb, width, window);
         let map: Vec<[f32; 3]> =
             drawn.measured.errors.flip_map.iter().map(|&value| heat(value)).collect();
-        paste(&mut out, [left, LINE + high], &map, width, window);
+        paste(&mut out, below(at, 1), &map, width, window);
+        if steps {
+            let shade = |&n: &u32| if n == NONE { [0.0; 3] } else { heat(n as f32 / MOST_STEPS) };
+            let map: Vec<[f32; 3]> = drawn.planes.steps.iter().map(shade).collect();
+            paste(&mut out, below(at, 2), &map, width, window);
+        }
+    }
+    let foot = rows * cell[1];
+    scale(&mut out, foot, "FLIP 0", "1");
+    if steps {
+        scale(&mut out, foot + LINE, "steps 0", &format!("{MOST_STEPS:.0} or more"));
     }
     out
+}
+
+/// What the colours of a map mean.
+fn scale(out: &mut Picture, top: usize, low: &str, high: &str) {
+    let left = GAP + 8 * low.len() + 8;
+    write(out, [GAP, top + 6], low);
+    let own = out.width as usize;
+    for y in 0..SCALE[1] {
+        for x in (0..SCALE[0]).filter(|x| left + x < own) {
+            out.rgb[(top + 5 + y) * own + left + x] = heat(x as f32 / SCALE[0] as f32);
+        }
+    }
+    write(out, [left + SCALE[0] + 8, top + 6], high);
 }
 
 fn pixels(n: usize) -> u32 {
