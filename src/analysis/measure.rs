@@ -169,6 +169,13 @@ impl Timed {
         Ratio::of(&self.reflection_ms(), &self.beside_ms)
     }
 
+    /// Quartiles of a stage's time by the reference's whole time, turn by turn: what the machine does slowly cancels out.
+    /// `None` if it was not timed apart, or there is no reference.
+    pub fn relative(&self, pick: fn(&FrameReport) -> Option<f64>) -> Option<Quantity> {
+        let pairs = self.reports.iter().zip(&self.beside_ms);
+        Quantity::of(pairs.filter_map(|(report, beside)| Some(pick(report)? / beside)))
+    }
+
     /// Quartiles of a stage's time; `None` if it was not timed apart.
     pub fn quantity(&self, pick: fn(&FrameReport) -> Option<f64>) -> Option<Quantity> {
         Quantity::of(self.reports.iter().filter_map(pick))

@@ -67,7 +67,7 @@ impl Curve {
         let mut list = Vec::new();
         for side in 0..self.sides.len() {
             for (stage, pick) in self.stages {
-                let of = |row: &Row| Some((row.x, row.timed[side].quantity(*pick)?));
+                let of = |row: &Row| Some((row.x, row.timed[side].relative(*pick)?));
                 let points: Vec<(f64, Quantity)> = self.rows.iter().filter_map(of).collect();
                 if !points.is_empty() {
                     list.push((self.name(side, stage), points));
@@ -93,11 +93,14 @@ impl Curve {
             joined: true,
         });
         let series: Vec<Series> = series.collect();
-        let y = Axis { label: "reflections of a frame, ms", log: true };
+        let y = Axis { label: "time / time of the reference", log: true };
         let plot = LinePlot { title: &self.title, x: self.x, y, series: &series, level: None };
         Ok(Plot {
             name: self.id.to_owned(),
-            caption: format!("{} (medians; bars span the quartiles).", self.title),
+            caption: format!(
+                "{}: time by that of {}, measured in turn (medians; bars span the quartiles).",
+                self.title, self.reference
+            ),
             image: Image::Svg(lines(&plot)?),
         })
     }

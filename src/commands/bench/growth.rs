@@ -15,9 +15,9 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::curve::{Curve, Row, TOTAL};
-use super::report::{Block, Section, number};
+use super::report::{Block, Image, Plot, Section, number};
 use super::run::{Bench, NOT_BUILT_IN, c3rc, params, with_mirror_triangles};
-use crate::commands::plots::Axis;
+use crate::commands::plots::{Axis, Dot, LinePlot, Series, lines};
 
 /// What is measured at each x: `c3rc` by its defaults and twice otherwise, and rays.
 const SIDES: [&str; 4] = ["c3rc", "c3rc draft", "c3rc paper", "1 ray a pixel"];
@@ -34,6 +34,16 @@ pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
     let mut blocks = vec![Block::Text(NOTE.to_owned())];
     let by_surfels = over_surfels(bench.part(0.02, 0.4), &described, &base)?;
     by_surfels.show(&mut blocks)?;
+    blocks.push(Block::Plot(once(
+        &by_surfels,
+        ("growth-memory", "Memory over the number of surfels", "MB"),
+        &["surfel MB", "tree MB"],
+    )?));
+    blocks.push(Block::Plot(once(
+        &by_surfels,
+        ("growth-preparing", "Preparing over the number of surfels, once", "ms"),
+        &["sampling ms", "trees ms", "shading ms"],
+    )?));
     let by_triangles = over_triangles(bench.part(0.4, 0.6), &described, &base, surfels)?;
     match &by_triangles {
         Some(curve) => curve.show(&mut blocks)?,
@@ -113,6 +123,24 @@ fn measure(
 fn curve(id: &'static str, title: &str, x: Axis, rows: Vec<Row>) -> Curve {
     let (sides, stages) = (SIDES.to_vec(), &TOTAL);
     Curve { id, title: title.to_owned(), x, sides, stages, rows, reference: REFERENCE }
+}
+
+/// What is there or done once, over x: columns of a curve by their names. `what`: a word for files, a title, a unit.
+fn once(curve: &Curve, what: (&str, &str, &'static str), columns: &[&str]) -> anyhow::Result<Plot> {
+    let (name, title, unit) = what;
+    let series = columns.iter().map(|column| {
+        let of = |row: &Row| {
+            let (.., figure) = row.more.iter().find(|more| more.0 == *column)?;
+            Some(Dot::exact(row.x, figure.as_f64()?))
+        };
+        let dots = curve.rows.iter().filter_map(of).collect();
+        Series { name: column.trim_end_matches(unit).to_owned(), dots, joined: true }
+    });
+    let series: Vec<Series> = series.collect();
+    let y = Axis { label: unit, log: true };
+    let plot = LinePlot { title, x: curve.x, y, series: &series, level: None };
+    let (name, caption) = (name.to_owned(), format!("{title}."));
+    Ok(Plot { name, caption, image: Image::Svg(lines(&plot)?) })
 }
 
 fn over_surfels(bench: Bench<'_>, described: &Scene, base: &Base) -> anyhow::Result<Curve> {

@@ -18,12 +18,13 @@ pub(super) const NOTE: &str = "Cameras (c3rc: draft, detail 1, default, best) an
 type View = (String, fn(&Cell, usize) -> Option<f64>, usize);
 
 fn views() -> Vec<View> {
-    let fastest: View = ("fastest, any error, to 1 ray".into(), |c, _| Some(c.fastest().1), 0);
+    let draft: View =
+        ("a camera a triangle (draft), any error, to 1 ray".into(), |c, _| Some(c.draft()), 0);
     let equal = (0..SPP.len()).map(|k| -> View {
         let rays = if SPP[k] == 1 { "1 ray".to_owned() } else { format!("{} rays", SPP[k]) };
         (format!("equal error, to {rays}"), |c, k| c.at_equal_error(k).map(|e| e.1), k)
     });
-    std::iter::once(fastest).chain(equal).collect()
+    std::iter::once(draft).chain(equal).collect()
 }
 
 /// Adds all maps.
@@ -42,6 +43,9 @@ pub(super) fn maps(maps: &[Map], blocks: &mut Vec<Block>) -> anyhow::Result<()> 
     let views = views();
     let sheets: Vec<HeatMap> =
         maps.iter().flat_map(|map| views.iter().map(move |view| heat(map, view))).collect();
+    // Where an error is never reached there is nothing to be seen; the words below say so.
+    let reached = |sheet: &HeatMap| sheet.ratios.iter().flatten().any(Option::is_some);
+    let sheets: Vec<HeatMap> = sheets.into_iter().filter(reached).collect();
     if !sheets.is_empty() {
         blocks.push(Block::Plot(Plot {
             name: "crossover-maps".into(),
@@ -65,8 +69,7 @@ fn curve(maps: &[Map]) -> anyhow::Result<Plot> {
     for map in maps {
         for (name, of, k) in views().into_iter().take(2) {
             let dot = |c: &Cell| Some(Dot::exact(c.pixels_a_triangle, of(c, k)?));
-            let short =
-                if k == 0 && name.starts_with("fastest") { "fastest" } else { "equal error" };
+            let short = if name.starts_with("equal") { "equal error" } else { "draft" };
             series.push(Series {
                 name: format!("{}: {short}", map.scene),
                 dots: map.cells.iter().filter_map(dot).collect(),
@@ -168,7 +171,6 @@ pub(super) fn figures(map: &Map) -> Value {
             "triangles": cell.triangles,
             "size": [cell.size.width, cell.size.height],
             "pixels_per_triangle": cell.pixels_a_triangle,
-            "fastest": cell.fastest().0,
             "sides": entries(cell).map(side).collect::<Vec<_>>(),
             "equal_error": equal.collect::<Vec<_>>(),
         })
