@@ -5,6 +5,7 @@
 mod analyze;
 mod bad_files;
 mod bad_options;
+mod bench;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod interrupt;

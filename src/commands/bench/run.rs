@@ -249,7 +249,8 @@ pub(super) fn head(args: &RunArgs, title: &str) -> Head {
     let memory = memory.map_or(String::new(), |b| format!(", {:.0} GB of memory", b * 1e-9));
     let names: Vec<String> = adapters.as_array().into_iter().flatten().map(adapter_name).collect();
     let names = if names.is_empty() { "none".to_owned() } else { names.join("; ") };
-    let facts = vec![
+    let inputs = inputs(&args.place);
+    let mut facts = vec![
         ("Date", today()),
         (
             "Machine",
@@ -273,6 +274,11 @@ pub(super) fn head(args: &RunArgs, title: &str) -> Head {
         ),
         ("Seed", args.place.seed.to_string()),
     ];
+    for input in &inputs {
+        let text = |key: &str| input[key].as_str().unwrap_or_default().to_owned();
+        let said = format!("{}, {} bytes, CRC-32 {}", text("file"), input["bytes"], text("crc32"));
+        facts.push(("File", said));
+    }
     let figures = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "date": today(),
@@ -280,8 +286,20 @@ pub(super) fn head(args: &RunArgs, title: &str) -> Head {
         "quick": args.quick,
         "repeat": rounds.repeat,
         "seed": args.place.seed,
+        "inputs": inputs,
     });
     Head { title: title.to_owned(), facts, figures }
+}
+
+/// The files among what was given: name, size and checksum.
+fn inputs(place: &PlaceArgs) -> Vec<Value> {
+    let given = [&place.inputs, &place.mirror, &place.object, &place.proxy];
+    let file = |name: &String| {
+        let bytes = std::fs::read(name).ok()?;
+        let sum = format!("{:08x}", crc32fast::hash(&bytes));
+        Some(json!({ "file": name, "bytes": bytes.len(), "crc32": sum }))
+    };
+    given.into_iter().flatten().filter_map(file).collect()
 }
 
 /// With what must be said of it.
