@@ -132,22 +132,26 @@ pub struct Rounds {
     pub repeat: u32,
     /// Rounds before that: they fill caches and memory.
     pub warm_up: u32,
-    /// A turn has as many frames as fit into so many milliseconds, of which the median counts: a short frame is at the
-    /// mercy of whatever else the machine does.
+    /// A turn has as many frames as fit into so many milliseconds, of which the fastest counts: a single frame is at the
+    /// mercy of whatever else the machine does, and that only ever makes it slower.
     pub least_ms: f64,
+    /// A turn has no fewer frames, unless they take more than [`LONG`] times `least_ms`.
+    pub least_frames: u32,
     /// A side that has taken so many milliseconds and [`LEAST_TURNS`] turns is left out from then on.
     pub most_ms: f64,
 }
 
 /// No side has fewer turns that count, if there are so many rounds.
 pub const LEAST_TURNS: usize = 3;
+/// Turns longer than so many times what they should be have fewer frames.
+pub const LONG: f64 = 4.0;
 /// A turn has no more frames.
 const MOST_FRAMES: f64 = 32.0;
 
 /// What one side took, by turn.
 #[derive(Clone, Debug, Default)]
 pub struct Timed {
-    /// Each the median of a turn's frames.
+    /// Each of a turn's fastest frame.
     pub reports: Vec<FrameReport>,
     /// Milliseconds of the reference's turns before and after each, their mean.
     pub beside_ms: Vec<f64>,
@@ -213,7 +217,7 @@ pub fn against(
         step(f64::from(round) / f64::from(total))?;
         let mut before = turn(stages, reference, own_frames)?;
         if !warm {
-            own_frames = frames_that_fit(rounds.least_ms, before.reflection_ms());
+            own_frames = frames_of(rounds, before.reflection_ms());
         }
         for (i, side) in sides.iter().enumerate() {
             let done = f64::from(round) + i as f64 / sides.len() as f64;
@@ -224,7 +228,7 @@ pub fn against(
             let report = turn(stages, side, frames[i])?;
             let ms = report.reflection_ms();
             if !warm {
-                frames[i] = frames_that_fit(rounds.least_ms, ms);
+                frames[i] = frames_of(rounds, ms);
                 continue;
             }
             let after = turn(stages, reference, own_frames)?;
@@ -240,16 +244,19 @@ pub fn against(
     Ok((own, timed))
 }
 
-/// The median of so many frames of one side.
+/// The fastest of so many frames of one side.
 fn turn(stages: &mut [Stage<'_>], side: &Side, frames: u32) -> Result<FrameReport> {
     let stage = &mut stages[side.stage];
     let reports: Result<Vec<FrameReport>> = (0..frames).map(|_| stage.run(side)).collect();
-    Ok(FrameReport::median(&reports?))
+    let by_time =
+        |a: &FrameReport, b: &FrameReport| a.reflection_ms().total_cmp(&b.reflection_ms());
+    Ok(reports?.into_iter().min_by(by_time).expect("a turn has frames"))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to MOST_FRAMES")]
-fn frames_that_fit(least_ms: f64, ms: f64) -> u32 {
-    (least_ms / ms.max(1e-3)).clamp(1.0, MOST_FRAMES) as u32
+fn frames_of(rounds: Rounds, ms: f64) -> u32 {
+    let fit = rounds.least_ms / ms.max(1e-3);
+    fit.max(f64::from(rounds.least_frames).min(LONG * fit)).clamp(1.0, MOST_FRAMES) as u32
 }
 
 #[cfg(test)]
@@ -288,8 +295,10 @@ mod tests {
 
     #[test]
     fn short_frames_are_drawn_several_times_a_turn() {
-        assert_eq!(frames_that_fit(30.0, 7.0), 4);
-        assert_eq!(frames_that_fit(30.0, 31.0), 1);
-        assert_eq!(frames_that_fit(30.0, 0.0), 32);
+        let rounds =
+            Rounds { repeat: 1, warm_up: 1, least_ms: 30.0, least_frames: 3, most_ms: 1e3 };
+        for (ms, frames) in [(7.0, 4), (31.0, 3), (50.0, 2), (200.0, 1), (0.0, 32)] {
+            assert_eq!(frames_of(rounds, ms), frames, "{ms} ms");
+        }
     }
 }

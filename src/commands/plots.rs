@@ -18,7 +18,7 @@ pub(super) const FONT: (&str, i32) = ("sans-serif", 15);
 /// Of what stands over a plot.
 const TITLE: (&str, i32) = ("sans-serif", 17);
 /// Width of a legend, pixels.
-const LEGEND: u32 = 190;
+const LEGEND: u32 = 240;
 
 /// Told apart by most eyes, on white and on black (after Okabe and Ito 2008).
 const COLORS: [RGBColor; 8] = [

@@ -49,8 +49,13 @@ pub(super) fn run(args: &LayerArgs, matches: &ArgMatches, cx: &Context) -> anyho
     }
     let backend = args.how.backend(method)?;
     let ready = args.scene.ready(leaf, cx)?;
-    let rounds =
-        Rounds { repeat: args.repeat, warm_up: WARM_UP, least_ms: 0.0, most_ms: f64::INFINITY };
+    let rounds = Rounds {
+        repeat: args.repeat,
+        warm_up: WARM_UP,
+        least_ms: 0.0,
+        least_frames: 1,
+        most_ms: f64::INFINITY,
+    };
     let step = |done| cx.step("measuring", done);
     let pair =
         against_rays(&ready.scene, &ready.eye, backend, method, params, rounds, (cx, &step))?;

@@ -1,6 +1,7 @@
 //! What the benches of whole scenes share: their flags, how far they are, and how scenes are prepared for them.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use catoptric::accel::KdTreeLimits;
 use catoptric::analysis::measure::Rounds;
@@ -24,7 +25,7 @@ use super::report::{self, Block, Head, Section};
 pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) place: PlaceArgs,
-    /// Turns of each side that count (default 11, or 5 with --quick)
+    /// Turns of each side that count (default 9, or 5 with --quick)
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub(crate) repeat: Option<u32>,
@@ -87,9 +88,10 @@ impl<'a> Bench<'a> {
     pub(super) fn rounds(self) -> Rounds {
         let quick = self.args.quick;
         Rounds {
-            repeat: self.args.repeat.unwrap_or(if quick { 5 } else { 11 }),
+            repeat: self.args.repeat.unwrap_or(if quick { 5 } else { 9 }),
             warm_up: 1,
-            least_ms: if quick { 15.0 } else { 50.0 },
+            least_ms: if quick { 12.0 } else { 50.0 },
+            least_frames: if quick { 1 } else { 3 },
             most_ms: if quick { 1000.0 } else { 4000.0 },
         }
     }
@@ -219,11 +221,12 @@ pub(super) fn begin(args: &RunArgs) -> anyhow::Result<()> {
 
 /// Runs a bench, and notes in its section what else the machine did meanwhile.
 pub(super) fn watched(bench: impl FnOnce() -> anyhow::Result<Section>) -> anyhow::Result<Section> {
-    let before = Load::now();
+    let (start, before) = (Instant::now(), Load::now());
     let mut section = bench()?;
     let others = before.zip(Load::now()).and_then(|(before, now)| before.others_until(now));
     let busy = others.is_some_and(|share| share > BUSY);
     section.figures["load"] = json!({ "others": others, "busy": others.map(|_| busy) });
+    section.figures["seconds"] = json!(start.elapsed().as_secs_f64().round());
     if let (true, Some(share)) = (busy, others) {
         let said = format!(
             "Busy machine: other programs took {:.0} % of it while this was measured. Ratios suffer less than times; repeat \
@@ -267,9 +270,9 @@ pub(super) fn head(args: &RunArgs, title: &str) -> Head {
         (
             "Method",
             format!(
-                "a reference has a turn before and after each side (A B A C A), {} turns after {} to warm up, each the median of as many \
-                 frames as fit into {:.0} ms; medians; ratios are turn by turn; ~ marks ratios whose quartiles are more than 10 % apart",
-                rounds.repeat, rounds.warm_up, rounds.least_ms
+                "a reference has a turn before and after each side (A B A C A), {} turns after {} to warm up, each the fastest of at least {} \
+                 frames and {:.0} ms; medians; ratios are turn by turn; ~ marks ratios whose quartiles are more than 10 % apart",
+                rounds.repeat, rounds.warm_up, rounds.least_frames, rounds.least_ms
             ),
         ),
         ("Seed", args.place.seed.to_string()),

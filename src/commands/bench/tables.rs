@@ -11,8 +11,9 @@ use catoptric::scene::prepared::PrepareOptions;
 use serde_json::{Value, json};
 
 use super::super::render::where_it_ran;
-use super::report::{Block, Section, Table, median, number, quantity, ratio, times};
+use super::report::{Block, Image, Plot, Section, Table, median, number, quantity, ratio, times};
 use super::run::{Bench, c3rc, leaves, paper_leaf, params};
+use crate::commands::plots::{Axis, Dot, LinePlot, Series, lines};
 
 /// A row of the paper's tables.
 struct Published {
@@ -133,6 +134,7 @@ pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
         title,
         blocks: vec![
             Block::Text(NOTE.to_owned()),
+            Block::Plot(plot(&rows)?),
             Block::Table(table_1(&rows)),
             Block::Table(table_2(&rows)),
             Block::Text(balance(&rows)),
@@ -193,6 +195,31 @@ fn over_objects(scene: &PreparedScene) -> KdTreeStatistics {
         mean_depth: depths / leaves as f64,
         points_per_leaf: scene.surfel_count() as f64 / leaves as f64,
     }
+}
+
+/// Totals over points, the paper's and ours.
+fn plot(rows: &[Measured]) -> anyhow::Result<Plot> {
+    let published =
+        rows.iter().map(|row| Dot::exact(row.paper.points_k as f64 * 1e3, row.paper.total_ms));
+    let name = "the paper's (2007)".to_owned();
+    let mut series = vec![Series { name, dots: published.collect(), joined: true }];
+    for (k, setting) in SETTINGS.iter().enumerate() {
+        let dot = |row: &Measured| {
+            let total = row.frames[k].total()?;
+            Some(Dot { x: row.surfels as f64, y: total.median, quartiles: [total.q1, total.q3] })
+        };
+        let dots = rows.iter().filter_map(dot).collect();
+        series.push(Series { name: setting.name.to_owned(), dots, joined: true });
+    }
+    let plot = LinePlot {
+        title: "Table 2: the reflection over the points",
+        x: Axis { label: "points", log: true },
+        y: Axis { label: "ms", log: true },
+        series: &series,
+        level: None,
+    };
+    let caption = "The paper's totals (3.4 GHz Pentium 4, Quadro FX 3400, its own scans) and those of this machine; bars span the quartiles.";
+    Ok(Plot { name: "tables".into(), caption: caption.into(), image: Image::Svg(lines(&plot)?) })
 }
 
 fn table_1(rows: &[Measured]) -> Table {

@@ -9,6 +9,7 @@ use catoptric::analysis::balance::{Balance, BalancePoint};
 use catoptric::analysis::measure::{Quantity, Side, Stage, Timed, against};
 use catoptric::backend::Backend;
 use catoptric::backend::cpu::Cpu;
+use catoptric::frame::FrameReport;
 use catoptric::scene::PreparedScene;
 use serde_json::{Value, json};
 
@@ -50,14 +51,18 @@ impl Sweep {
         self.points.iter().filter(move |p| p.test == test && p.detail == detail)
     }
 
-    /// The same as numbers; totals in milliseconds, by the ratio to the reference: that moves with the machine.
+    /// A stage's time, milliseconds, as its share of the reference's turns beside it: so it moves with the machine as they do.
+    fn stage_ms(&self, point: &Point, pick: fn(&FrameReport) -> Option<f64>) -> Option<f64> {
+        Some(point.timed.relative(pick)?.median * self.reference?.median)
+    }
+
+    /// The same as numbers.
     fn numbers(&self, test: &str, detail: &str) -> Vec<BalancePoint> {
-        let scale = self.reference.map_or(f64::NAN, |q| q.median);
         let number = |p: &Point| BalancePoint {
             leaf: p.leaf,
-            cull_ms: p.timed.quantity(|r| r.cull_ms).map_or(0.0, |q| q.median),
-            project_ms: p.timed.quantity(|r| r.project_ms).map_or(f64::NAN, |q| q.median),
-            total: p.timed.ratio().map_or(f64::NAN, |r| r.of.median * scale),
+            cull_ms: self.stage_ms(p, |r| r.cull_ms).unwrap_or(0.0),
+            project_ms: self.stage_ms(p, |r| r.project_ms).unwrap_or(f64::NAN),
+            total: self.stage_ms(p, |r| Some(r.reflection_ms())).unwrap_or(f64::NAN),
             valid_share: p.timed.report().valid_share(),
         };
         self.of(test, detail).map(number).collect()

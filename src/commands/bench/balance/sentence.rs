@@ -42,13 +42,22 @@ pub(super) fn optimum(
     let before = balance.least.checked_sub(1).and_then(|i| points.get(i));
     let after = points.get(balance.least + 1);
     match (before, after) {
-        (Some(small), Some(large)) => text.push_str(&format!(
-            " With leaves of {} {}, with leaves of {} {}: on either side one costs more than the other saves.",
-            small.leaf,
-            change(small),
-            large.leaf,
-            change(large)
-        )),
+        (Some(small), Some(large)) => {
+            let both = |p: &BalancePoint| p.cull_ms + p.project_ms;
+            let dearer = both(small) > both(best) && both(large) > both(best);
+            text.push_str(&format!(
+                " With leaves of {} {}, with leaves of {} {}: {}.",
+                small.leaf,
+                change(small),
+                large.leaf,
+                change(large),
+                if dearer {
+                    "on either side one costs more than the other saves"
+                } else {
+                    "the two alone would not be least there, so the rest of the layer or noise decides"
+                }
+            ));
+        }
         (None, Some(large)) => text.push_str(&format!(
             " That is the smallest leaf of the sweep, so the optimum may lie below it: with leaves of {} {}.",
             large.leaf,
@@ -133,6 +142,11 @@ mod tests {
         );
         assert!(text.contains("17.5 projections here (leaves of 128) and 107"), "{text}");
         assert!(text.contains("cheap culling pays for smaller leaves than there"));
+        assert!(text.contains("on either side one costs more than the other saves"));
+        let mut points = sweep(40.0);
+        points[1].total = 0.1;
+        let text = optimum("cpu", "slab", Balance::of(&points).unwrap(), &points);
+        assert!(text.contains("leaves of 16") && text.contains("or noise decides"), "{text}");
         let text = said(1000.0);
         assert!(text.contains("leaves of 256") && text.contains("dear culling"), "{text}");
         assert!(said(0.1).contains("smallest leaf of the sweep"));

@@ -65,8 +65,8 @@ fn plot(sweep: &Sweep, kind: &str, detail: &str) -> anyhow::Result<Plot> {
                 parts: vec![
                     number.cull_ms,
                     number.project_ms,
-                    point.timed.quantity(|r| r.splat_ms).map_or(0.0, |q| q.median),
-                    point.timed.quantity(|r| r.cameras_ms).map_or(0.0, |q| q.median),
+                    sweep.stage_ms(point, |r| r.splat_ms).unwrap_or(0.0),
+                    sweep.stage_ms(point, |r| r.cameras_ms).unwrap_or(0.0),
                 ],
                 total: number.total,
                 share: number.valid_share,
@@ -77,7 +77,7 @@ fn plot(sweep: &Sweep, kind: &str, detail: &str) -> anyhow::Result<Plot> {
             least: Balance::of(&numbers).map(|b| b.least),
         }
     };
-    let share = if sweep.shares_counted { "valid, %" } else { "valid (not counted)" };
+    let share = sweep.shares_counted.then_some("valid, %");
     let labels = StackLabels {
         x: "surfels a leaf",
         y: "ms",
@@ -89,7 +89,7 @@ fn plot(sweep: &Sweep, kind: &str, detail: &str) -> anyhow::Result<Plot> {
         name: format!("balance-{kind}-detail-{detail}"),
         caption: format!(
             "Culling and projection over the leaf, on {}, detail {detail}: time by stage (threads' time by their number), the layer's \
-             wall time as a line across each bar, the least marked.",
+             wall time as a line across each bar, the least marked. Times are by the reference's turns beside them.",
             sweep.place
         ),
         image: Image::Svg(stacks(&TESTS.map(one), &labels)?),

@@ -10,6 +10,7 @@ const STYLE: &str = "
 @media (prefers-color-scheme: dark) {
   :root { --paper: #16181c; --ink: #e4e4e4; --faint: #a0a0a0; --line: #3a3d44; --mark: #ff9d57; }
   svg rect[fill=\"#FFFFFF\"] { fill: var(--paper); }
+  svg rect[fill=\"#000000\"] { fill: var(--ink); }
   svg text[fill=\"#000000\"] { fill: var(--ink); }
   svg [stroke=\"#000000\"] { stroke: var(--ink); }
 }
@@ -23,7 +24,7 @@ svg, img { max-width: 100%; height: auto; }
 details { margin: 1rem 0; } summary { cursor: pointer; }
 .wide { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
 th, td { padding: .2rem .6rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; } td.noisy { color: var(--mark); }
+th { white-space: normal; vertical-align: bottom; } th:first-child, td:first-child { text-align: left; } td.noisy { color: var(--mark); }
 ";
 
 /// All of a report.
@@ -92,7 +93,7 @@ fn inlined(text: &str, caption: &str) -> String {
 }
 
 /// A table with more rows is folded up.
-const LONG: usize = 16;
+const LONG: usize = 26;
 
 fn table(page: &mut String, table: &Table) {
     let long = table.rows.len() > LONG;
