@@ -40,7 +40,7 @@ const SIZE: (u32, u32) = (470, 300);
 
 /// Plots in two columns, all over one range of y.
 pub(crate) fn stacks(plots: &[StackPlot], labels: &StackLabels<'_>) -> anyhow::Result<String> {
-    let columns = plots.len().min(2).max(1);
+    let columns = plots.len().clamp(1, 2);
     let rows = plots.len().div_ceil(columns).max(1);
     let [width, height] = [SIZE.0 as usize * columns, SIZE.1 as usize * rows];
     let size = (u32::try_from(width)?, u32::try_from(height)?);

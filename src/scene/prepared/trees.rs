@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use super::{Cloud, PrepareOptions, PreparedScene, milliseconds, pad};
-use crate::accel::kd_tree::{Node, WideNode};
 use crate::accel::{KdTree, KdTreeLimits};
 use crate::context::Context;
 use crate::error::Result;
@@ -67,9 +66,7 @@ impl PreparedScene {
         let numbers = size_of_val(&x[..]) + size_of_val(&y[..]) + size_of_val(&z[..]);
         let vectors =
             size_of_val(&normals[..]) + size_of_val(&albedo[..]) + size_of_val(&radiance[..]);
-        let tree = |tree: &KdTree| {
-            tree.nodes().len() * size_of::<Node>() + tree.wide().len() * size_of::<WideNode>()
-        };
+        let tree = |tree: &KdTree| size_of_val(tree.nodes()) + size_of_val(tree.wide());
         SurfelBytes {
             surfels: numbers + vectors + size_of_val(&extent[..]),
             trees: self.clouds.iter().map(|cloud| tree(&cloud.tree)).sum(),
