@@ -138,7 +138,7 @@ mod tests {
             text.contains("leaves of 32 culling changes by +0.625 ms and projection by -0.320 ms")
         );
         assert!(
-            text.contains("leaves of 128 culling changes by -0.313 ms and projection by +0.640")
+            text.contains("leaves of 128 culling changes by -0.312 ms and projection by +0.640")
         );
         assert!(text.contains("17.5 projections here (leaves of 128) and 107"), "{text}");
         assert!(text.contains("cheap culling pays for smaller leaves than there"));
