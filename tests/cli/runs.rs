@@ -22,6 +22,7 @@ const FIGURES: [&str; 18] = [
     "projections",
     "valid",
     "valid_share",
+    "mean_steps",
     "mirror_pixels",
     "covered_pixels",
     "notes",
