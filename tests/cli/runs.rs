@@ -9,7 +9,7 @@ fn keys(value: &Value) -> Vec<&str> {
 }
 
 /// The keys of a frame's figures, in order.
-const FIGURES: [&str; 18] = [
+const FIGURES: [&str; 19] = [
     "scene",
     "method",
     "backend",
