@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::SplatShape;
 use crate::camera::Eye;
 use crate::camera::reflector::{ReflectorMap, estalella};
+use crate::visibility::Visibility;
 
 /// Which way a surface is curved, seen from the mirror side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +36,13 @@ pub struct ReflectorPart {
     pub map: ReflectorMap,
     /// What of a point's images can be found.
     pub bend: Bend,
+}
+
+impl ReflectorPart {
+    /// Whether the centre of a pixel shows the part.
+    pub fn owns(&self, visibility: &Visibility, pixel: usize) -> bool {
+        self.triangles.contains(&visibility.mirror_ids[pixel])
+    }
 }
 
 /// How reflection points are found.

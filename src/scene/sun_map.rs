@@ -182,7 +182,7 @@ impl SunMap {
     }
 
     /// [`Self::lights`] for a point in scene space.
-    #[cfg(test)]
+    #[inline]
     pub(super) fn lights_point(&self, point: Vec3, facing: f32) -> Option<bool> {
         let [x, y, height] = self.axes.map(|axis| axis.dot(point));
         self.lights([x + self.offset[0], y + self.offset[1], height], facing)

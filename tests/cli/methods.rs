@@ -112,6 +112,25 @@ fn what_is_known_of_a_mirror_is_said() {
     );
 }
 
+/// The scenes of benches/COMPARISON.md.
+#[test]
+fn the_papers_scenes_are_drawn() {
+    let folder = Folder::new();
+    let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/comparison");
+    let mut drawn = 0;
+    for entry in std::fs::read_dir(scenes).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let line = |method| format!("render '{}' {SMALL} --method {method}", path.display());
+            for method in ["c3rc", "estalella", "roger-holzschuch", "environment"] {
+                folder.good(&line(method));
+            }
+            drawn += 1;
+        }
+    }
+    assert_eq!(drawn, 5);
+}
+
 /// Steps of searches: in the figures, and by pixel.
 #[test]
 fn steps_are_counted() {

@@ -9,7 +9,7 @@ fn keys(value: &Value) -> Vec<&str> {
 }
 
 /// The keys of a frame's figures, in order.
-const FIGURES: [&str; 18] = [
+const FIGURES: [&str; 19] = [
     "scene",
     "method",
     "backend",
@@ -22,6 +22,7 @@ const FIGURES: [&str; 18] = [
     "projections",
     "valid",
     "valid_share",
+    "mean_steps",
     "mirror_pixels",
     "covered_pixels",
     "notes",

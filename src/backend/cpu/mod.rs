@@ -85,7 +85,7 @@ impl Backend for Cpu {
                     add(&mut report.passes_ms, milliseconds(start));
                 }
                 Pass::Search(pass) => {
-                    let done = search::search(pass, scene, visibility, &search::by_cpu, out)?;
+                    let done = search::search(pass, scene, visibility, &search::OnCpu, out)?;
                     add(&mut report.passes_ms, milliseconds(start));
                     done.enter(&mut report);
                 }

@@ -10,6 +10,7 @@ mod device;
 mod look;
 mod pipelines;
 mod records;
+mod reflected;
 mod scene;
 mod search;
 mod shaders;
@@ -32,12 +33,12 @@ use self::look::Composer;
 use self::pipelines::{Groups, Pipelines};
 use self::records::Records;
 use self::scene::SceneBuffers;
-use self::search::Searcher;
+use self::search::{OnDevice, Searcher};
 use self::timing::Timing;
 use super::cpu::finish::finish;
 use super::cpu::lookup::{Asked, lookup};
 use super::cpu::planes::{mark_mirrors, splat_planes};
-use super::cpu::search::{Job, search};
+use super::cpu::search::search;
 use super::cpu::splat::{EMPTY, Landed};
 use super::{Backend, ExecuteReport};
 use crate::camera::Eye;
@@ -277,10 +278,10 @@ impl Ready {
                 Pass::Resolve => {}
                 Pass::Search(pass) => {
                     let start = Instant::now();
-                    let searcher = RefCell::new(searcher(&mut self.searcher, &self.gpu)?);
-                    searcher.borrow_mut().hold_maps(&self.gpu, &pass.parts)?;
-                    let find = |job: &Job<'_>| searcher.borrow_mut().find(&self.gpu, job);
-                    let done = search(pass, scene, visibility, &find, out)?;
+                    let searcher = searcher(&mut self.searcher, &self.gpu)?;
+                    searcher.hold_maps(&self.gpu, &pass.parts)?;
+                    let device = OnDevice::new(&self.gpu, searcher);
+                    let done = search(pass, scene, visibility, &device, out)?;
                     report.passes_ms = Some(milliseconds(start));
                     done.enter(&mut report);
                     self.is_here = false;

@@ -318,7 +318,7 @@ fn pipeline_layout(gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::PipelineL
     })
 }
 
-fn module(gpu: &Gpu, text: &str) -> wgpu::ShaderModule {
+pub(super) fn module(gpu: &Gpu, text: &str) -> wgpu::ShaderModule {
     #[cfg(test)]
     let text = match gpu.mutant {
         Some([from, to]) => &text.replace(from, to),

@@ -1,5 +1,7 @@
-//! Searches on reflectors, and cube maps read, on the device: lists of points go up, what was found comes back.
+//! Searches on reflectors, and cube maps read, on the device: lists of points go up, what was found comes back. Then
+//! `reflected` draws.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -7,9 +9,11 @@ use glam::Vec3;
 use super::buffers::Grown;
 use super::device::Gpu;
 use super::pipelines::{compute, dispatch, group};
+use super::reflected::Rasteriser;
 use super::shaders;
 use crate::backend::cpu::lookup::Asked;
-use crate::backend::cpu::search::Job;
+use crate::backend::cpu::search::raster::{Drawing, Hit};
+use crate::backend::cpu::search::{Job, OnCpu, SearchBackend};
 use crate::camera::reflector::Found;
 use crate::error::Result;
 use crate::plan::EnvironmentCube;
@@ -49,6 +53,8 @@ pub(super) struct Searcher {
     maps: Option<(Arc<Vec<ReflectorPart>>, Vec<Maps>)>,
     /// Of these cubes.
     cubes: Option<(Arc<Vec<EnvironmentCube>>, Vec<wgpu::Buffer>)>,
+    /// Made when it is first needed.
+    rasteriser: Option<Rasteriser>,
 }
 
 impl Searcher {
@@ -66,6 +72,7 @@ impl Searcher {
             out: Grown::new("reflection points", U::MAP_READ | U::COPY_DST),
             maps: None,
             cubes: None,
+            rasteriser: None,
         })
     }
 
@@ -126,6 +133,15 @@ impl Searcher {
             })?;
         }
         Ok(list)
+    }
+
+    /// Which triangle each pixel shows.
+    fn rasterise(&mut self, gpu: &Gpu, drawing: &Drawing<'_>) -> Result<Option<Vec<Hit>>> {
+        let rasteriser = match &mut self.rasteriser {
+            Some(rasteriser) => rasteriser,
+            none => none.insert(Rasteriser::new(gpu)?),
+        };
+        rasteriser.draw(gpu, drawing)
     }
 
     /// What cubes hold in the directions that are asked for.
@@ -196,6 +212,31 @@ impl Searcher {
             encoder.copy_buffer_to_buffer(self.found.buffer(), 0, self.out.buffer(), 0, bytes);
             gpu.queue.submit([encoder.finish()]);
         })
+    }
+}
+
+/// A device's side of search passes.
+pub(super) struct OnDevice<'a> {
+    gpu: &'a Gpu,
+    searcher: RefCell<&'a mut Searcher>,
+}
+
+impl<'a> OnDevice<'a> {
+    /// With a searcher that holds the pass's maps.
+    pub(super) fn new(gpu: &'a Gpu, searcher: &'a mut Searcher) -> Self {
+        Self { gpu, searcher: RefCell::new(searcher) }
+    }
+}
+
+impl SearchBackend for OnDevice<'_> {
+    fn find(&self, job: &Job<'_>) -> Result<Vec<Found>> {
+        self.searcher.borrow_mut().find(self.gpu, job)
+    }
+
+    fn rasterise(&self, drawing: &Drawing<'_>) -> Result<Vec<Hit>> {
+        let drawn = self.searcher.borrow_mut().rasterise(self.gpu, drawing)?;
+        // Pictures larger than the device's textures are drawn here.
+        drawn.map_or_else(|| OnCpu.rasterise(drawing), Ok)
     }
 }
 

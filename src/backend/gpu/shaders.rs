@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::records::{LAYOUT, NO_OWNER};
 use super::surfaces::{PAINTS, SURFACE_ROWS};
+use crate::backend::cpu::search::raster::BACK_SLACK;
 use crate::backend::cpu::splat::{EDGE_TOLERANCE, blend, projection};
 use crate::camera::reflector::{self, estalella, roger};
 use crate::camera::three_ray::project::NOISE_ROUNDINGS;
@@ -39,6 +40,7 @@ const COMPUTE_KEYS: &str = file!("passes/compute_keys.wgsl");
 const RESOLVE_LISTS: &str = file!("passes/resolve_lists.wgsl");
 const RESOLVE_KEYS: &str = file!("passes/resolve_keys.wgsl");
 const CLOSE: &str = file!("passes/close.wgsl");
+const REFLECTED: &str = file!("passes/reflected.wgsl");
 const SEARCH: &str = file!("passes/search.wgsl");
 const CUBE: &str = file!("camera/reflector/cube.wgsl");
 const ESTALELLA: &str = file!("camera/reflector/estalella.wgsl");
@@ -162,6 +164,11 @@ pub(super) fn search() -> String {
         writeln!(text, "const {name}: f32 = {value:?}f;").expect("strings grow");
     }
     [&text, SEARCH, CUBE, ESTALELLA, ROGER].concat()
+}
+
+/// Triangles between images on a mirror.
+pub(super) fn reflected() -> String {
+    format!("const BACK_SLACK: f32 = {BACK_SLACK:?}f;\n{REFLECTED}")
 }
 
 /// The direct view, the environment and the composition, with their entry points.

@@ -4,6 +4,7 @@ mod footprints;
 mod looks;
 mod mutants;
 mod pictures;
+mod reflected;
 mod searches;
 mod twins;
 

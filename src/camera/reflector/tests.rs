@@ -128,6 +128,10 @@ fn roger_and_holzschuch_find_the_exact_points() {
 fn estalella_finds_the_exact_points() {
     for (surface, most) in [(SPHERE, 2.0), (ELLIPSOID, 3.0), (BUMPY, 3.0)] {
         let (map, cases) = (map(surface, false), cases(surface, 20_000));
+        for steps in [3, 5, 7] {
+            let (median, p99, _) = errors(&cases, |case| by_estalella(&map, case, steps));
+            eprintln!("estalella {surface:?}, {steps} steps: median {median:.4}, p99 {p99:.4}");
+        }
         let (median, p99, _) = errors(&cases, |case| by_estalella(&map, case, 9));
         eprintln!("estalella {surface:?}: median {median:.4}, p99 {p99:.4}");
         assert!(p99 <= most && median <= 0.1, "{surface:?}: median {median}, p99 {p99} px");

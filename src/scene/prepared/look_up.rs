@@ -66,7 +66,10 @@ impl PreparedScene {
         let (position, normal) = self.surface_at(triangle, weights);
         let (object, triangle) = self.object_of_triangle(triangle);
         let albedo = self.objects[object].albedo(triangle, weights);
-        let point = SurfacePoint { position, normal, extent: 0.0 };
-        shade(albedo, normal, sun.visible_from(&point), &self.light)
+        let facing = normal.dot(self.light.to_sun);
+        let by_ray = || sun.visible_from(&SurfacePoint { position, normal, extent: 0.0 });
+        let lit =
+            facing > 0.0 && self.sun_map.lights_point(position, facing).unwrap_or_else(by_ray);
+        shade(albedo, normal, lit, &self.light)
     }
 }

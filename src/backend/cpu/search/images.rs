@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Done, Finder, Job};
+use super::{Done, Job, SearchBackend};
 use crate::camera::reflector::Found;
 use crate::camera::three_ray::Rays;
 use crate::error::Result;
@@ -89,7 +89,7 @@ pub(super) struct Reflecting<'a> {
     pub(super) pass: &'a SearchPass<'a>,
     pub(super) part: &'a ReflectorPart,
     pub(super) scene: &'a PreparedScene,
-    finder: &'a Finder<'a>,
+    pub(super) backend: &'a dyn SearchBackend,
     place: Place,
 }
 
@@ -98,14 +98,14 @@ impl<'a> Reflecting<'a> {
         pass: &'a SearchPass<'a>,
         part: &'a ReflectorPart,
         scene: &'a PreparedScene,
-        finder: &'a Finder<'a>,
+        backend: &'a dyn SearchBackend,
     ) -> Self {
         let to_scene = scene.clouds[scene.objects.len() + part.mirror].to_scene;
         let is_virtual = matches!(pass.search, Search::Estalella(_));
         let center = part.center.as_dvec3();
         let mut place = Place { to_scene, center, eye: Vec3::ZERO, is_virtual };
         place.eye = place.local(pass.eye.position);
-        Self { pass, part, scene, finder, place }
+        Self { pass, part, scene, backend, place }
     }
 
     /// Whether virtual vertices are drawn, in their places behind the mirror, or reflection points on it.
@@ -132,7 +132,7 @@ impl<'a> Reflecting<'a> {
         let local: Vec<Vec3> = points.par_iter().map(|&p| place.local(p)).collect();
         let px = 1.0 / self.pass.eye.focal_px;
         let (search, eye) = (self.pass.search, place.eye);
-        (self.finder)(&Job { part: self.part, search, eye, px, points: &local })
+        self.backend.find(&Job { part: self.part, search, eye, px, points: &local })
     }
 
     /// For each of some points in scene space that are reflected: the rays around its path, local, and the distance along

@@ -5,6 +5,7 @@
 mod images;
 mod pieces;
 mod points;
+pub(crate) mod raster;
 mod tessellate;
 #[cfg(test)]
 mod tests;
@@ -17,6 +18,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use self::images::Reflecting;
+use self::raster::{Drawing, Hit};
 use crate::backend::ExecuteReport;
 use crate::camera::reflector::{Found, estalella, roger};
 use crate::error::Result;
@@ -68,12 +70,29 @@ pub(crate) struct Job<'a> {
     pub(crate) points: &'a [Vec3],
 }
 
-/// Finds the reflection points of a job's points.
-pub(crate) type Finder<'a> = dyn Fn(&Job<'_>) -> Result<Vec<Found>> + 'a;
+/// What a search pass leaves to a device, which may fail.
+pub(crate) trait SearchBackend {
+    /// Finds the reflection points of a job's points.
+    fn find(&self, job: &Job<'_>) -> Result<Vec<Found>>;
 
-/// On the CPU.
-#[expect(clippy::unnecessary_wraps, reason = "a finder may be a device that fails")]
-pub(crate) fn by_cpu(job: &Job<'_>) -> Result<Vec<Found>> {
+    /// Says which triangle each pixel shows, by rising pixels.
+    fn rasterise(&self, drawing: &Drawing<'_>) -> Result<Vec<Hit>>;
+}
+
+/// Does both here.
+pub(crate) struct OnCpu;
+
+impl SearchBackend for OnCpu {
+    fn find(&self, job: &Job<'_>) -> Result<Vec<Found>> {
+        Ok(find(job))
+    }
+
+    fn rasterise(&self, drawing: &Drawing<'_>) -> Result<Vec<Hit>> {
+        Ok(raster::rasterise(drawing))
+    }
+}
+
+fn find(job: &Job<'_>) -> Vec<Found> {
     /// Points a task: untuned.
     const CHUNK: usize = 256;
     let map = &job.part.map;
@@ -88,18 +107,18 @@ pub(crate) fn by_cpu(job: &Job<'_>) -> Result<Vec<Found>> {
         };
         map.settled(found, point)
     };
-    Ok(job.points.par_iter().with_min_len(CHUNK).map(find).collect())
+    job.points.par_iter().with_min_len(CHUNK).map(find).collect()
 }
 
 /// Executes the pass.
 ///
 /// # Errors
-/// The finder failed.
+/// The backend failed.
 pub(crate) fn search(
     pass: &SearchPass<'_>,
     scene: &PreparedScene,
     visibility: &Visibility,
-    finder: &Finder<'_>,
+    backend: &dyn SearchBackend,
     out: &mut Reflection,
 ) -> Result<Done> {
     let pixels = visibility.size.pixels();
@@ -111,11 +130,11 @@ pub(crate) fn search(
     for part in &*pass.parts {
         let start = Instant::now();
         let searched = done.search_ms;
-        let reflecting = Reflecting::new(pass, part, scene, finder);
+        let reflecting = Reflecting::new(pass, part, scene, backend);
         match pass.primitive {
             Primitive::Triangles { longest_px } => {
                 let meshes = triangles::meshes(&reflecting, longest_px, visibility, &mut done)?;
-                triangles::draw(&reflecting, &meshes, visibility, out);
+                triangles::draw(&reflecting, &meshes, visibility, out)?;
             }
             Primitive::Points(shape) => {
                 points::draw(&reflecting, shape, visibility, out, &mut done)?;

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 use super::Done;
 use super::images::Reflecting;
-use super::triangles::owns;
 use crate::error::Result;
 use crate::image::{NONE, Reason};
 use crate::plan::{Reflection, SplatShape};
@@ -54,7 +53,7 @@ pub(super) fn draw(
                     && (0..i64::from(size.height)).contains(&y)
                 {
                     let pixel = usize::try_from(y * i64::from(size.width) + x).unwrap_or(0);
-                    if owns(reflecting.part, visibility, pixel) {
+                    if reflecting.part.owns(visibility, pixel) {
                         keys[pixel].fetch_min(key, Ordering::Relaxed);
                     }
                 }
