@@ -37,6 +37,9 @@ pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
     let mut blocks = vec![Block::Text(NOTE.to_owned())];
     let by_surfels = over_surfels(bench.part(0.02, 0.4), &described, &base)?;
     by_surfels.show(&mut blocks)?;
+    if by_surfels.rows.last().is_none_or(|row| row.x < most_surfels(bench) as f64) {
+        blocks.push(Block::Text("More surfels do not go into the free memory.".to_owned()));
+    }
     blocks.push(Block::Plot(once(
         &by_surfels,
         ("growth-memory", "Memory over the number of surfels", "MB"),
@@ -146,9 +149,14 @@ fn once(curve: &Curve, what: (&str, &str, &'static str), columns: &[&str]) -> an
     Ok(Plot { name, caption, image: Image::Svg(lines(&plot)?) })
 }
 
-fn over_surfels(bench: Bench<'_>, described: &Scene, base: &Base) -> anyhow::Result<Curve> {
+/// Where the surfels end.
+fn most_surfels(bench: Bench<'_>) -> usize {
     let most = bench.pick(10_000_000, 316_228);
-    let most = bench.args.max.map_or(most, |max| usize::try_from(max).unwrap_or(most));
+    bench.args.max.map_or(most, |max| usize::try_from(max).unwrap_or(most))
+}
+
+fn over_surfels(bench: Bench<'_>, described: &Scene, base: &Base) -> anyhow::Result<Curve> {
+    let most = most_surfels(bench);
     // Two a decade.
     let mut counts: Vec<usize> = (0..)
         .flat_map(|decade| {
@@ -157,6 +165,7 @@ fn over_surfels(bench: Bench<'_>, described: &Scene, base: &Base) -> anyhow::Res
         .take_while(|&n| n < most)
         .collect();
     counts.push(most);
+    counts.retain(|&count| bench.fits(count));
     let mut rows = Vec::new();
     for (i, &count) in counts.iter().enumerate() {
         let part = bench.turn(i, counts.len());

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use catoptric::accel::KdTreeLimits;
-use catoptric::analysis::measure::Rounds;
+use catoptric::analysis::measure::{Rounds, Timed};
 use catoptric::backend::Backend;
+use catoptric::camera::Eye;
+use catoptric::frame::Renderer;
 use catoptric::methods::{Method, Params, method};
 use catoptric::scene::arrange;
 use catoptric::scene::description::{Scene, Source};
@@ -17,7 +19,7 @@ use serde_json::{Value, json};
 
 use super::super::machine::{BUSY, Load, machine, today};
 use super::super::render::HowArgs;
-use super::super::{PlaceArgs, check_folder, check_json, say, write_json};
+use super::super::{PlaceArgs, check_folder, check_json, memory, say, write_json};
 use super::report::{self, Block, Head, Section};
 
 /// What all benches of whole scenes can be told.
@@ -129,9 +131,17 @@ impl<'a> Bench<'a> {
         surfels: usize,
         leaf: u32,
     ) -> catoptric::Result<PreparedScene> {
-        super::super::memory::check(surfels, self.args.place.size)?;
+        if !self.fits(surfels) {
+            let problem = format!("{surfels} surfels do not go into the free memory");
+            return Err(Error::input("--max", "", problem, "give a smaller number"));
+        }
         let options = PrepareOptions { surfels, tree: leaves(leaf), seed: self.args.place.seed };
         PreparedScene::new(scene, &options, &self.silent())
+    }
+
+    /// Whether so many surfels go into the free memory.
+    pub(super) fn fits(self, surfels: usize) -> bool {
+        memory::check(surfels, self.args.place.size).is_ok()
     }
 
     /// Where c3rc is to run.
@@ -178,6 +188,24 @@ pub(super) fn with_mirror_triangles(scene: &Scene, triangles: usize) -> Option<S
     mirror.mesh = std::sync::Arc::new(builtin::shape(name, Some(triangles))?);
     mirror.source = Some(Source::Shape { name: name.clone(), triangles: Some(triangles) });
     Some(scene)
+}
+
+/// The share of valid projections of a frame that was measured, counted on the CPU where its device did not.
+pub(super) fn valid_share(
+    timed: &Timed,
+    scene: &PreparedScene,
+    eye: &Eye,
+    params: &Params,
+) -> catoptric::Result<Option<f64>> {
+    let measured = timed.report();
+    if measured.valid.is_some() {
+        return Ok(measured.valid_share());
+    }
+    let made = c3rc().prepare(scene, params, &Context::default())?;
+    let mut renderer = Renderer::new();
+    renderer.see(scene, eye);
+    let (counted, _) = renderer.reflect(scene, eye, c3rc(), &made, params, false)?;
+    Ok(counted.valid_share())
 }
 
 /// Where that is so.

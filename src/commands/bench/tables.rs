@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::super::render::where_it_ran;
 use super::report::{Block, Image, Plot, Section, Table, median, number, quantity, ratio, times};
-use super::run::{Bench, c3rc, leaves, paper_leaf, params};
+use super::run::{Bench, c3rc, leaves, paper_leaf, params, valid_share};
 use crate::commands::plots::{Axis, Dot, LinePlot, Series, lines};
 
 /// A row of the paper's tables.
@@ -58,6 +58,7 @@ const PAPER: [Published; 6] = [
 const PAPER_RATE: f64 = 3.4;
 
 /// A way to draw the frame.
+#[derive(Clone, Copy)]
 struct Setting {
     name: &'static str,
     preset: &'static str,
@@ -85,6 +86,8 @@ struct Measured {
     trees: [Tree; 2],
     /// By [`SETTINGS`].
     frames: Vec<Timed>,
+    /// Likewise.
+    valid_shares: Vec<Option<f64>>,
 }
 
 struct Tree {
@@ -110,18 +113,23 @@ pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
         let eye = part.args.place.eye(&scene)?;
         let mut stages =
             [Stage::new(&scene, &eye, part.backend()?), Stage::new(&fine, &eye, part.backend()?)];
-        let mut sides = Vec::new();
-        for setting in &SETTINGS {
-            let params = params(c3rc(), setting.preset, setting.values);
+        let (mut sides, all) = (Vec::new(), SETTINGS.map(|s| params(c3rc(), s.preset, s.values)));
+        for (setting, params) in SETTINGS.iter().zip(&all) {
             let stage = usize::from(!setting.paper_leaf);
-            sides.push(Side::new(&stages, stage, c3rc(), params, &part.silent())?);
+            sides.push(Side::new(&stages, stage, c3rc(), params.clone(), &part.silent())?);
         }
         let measuring = part.part(0.3, 1.0);
         let published = sides.remove(0);
         let step = |done| measuring.step(done);
         let (published, others) = against(&mut stages, &published, &sides, part.rounds(), step)?;
-        let frames = std::iter::once(published).chain(others).collect();
-        rows.push(Measured { paper, surfels, trees, frames });
+        let frames: Vec<Timed> = std::iter::once(published).chain(others).collect();
+        let counted =
+            frames.iter().zip(SETTINGS.iter().zip(&all)).map(|(timed, (setting, params))| {
+                let own = if setting.paper_leaf { &scene } else { &fine };
+                valid_share(timed, own, &eye, params)
+            });
+        let valid_shares = counted.collect::<catoptric::Result<_>>()?;
+        rows.push(Measured { paper, surfels, trees, frames, valid_shares });
     }
     let size = bench.args.place.size;
     let place = rows.last().map_or(String::new(), |row| where_it_ran(&row.frames[0].report()));
@@ -288,7 +296,7 @@ fn table_2(rows: &[Measured]) -> Table {
             "–".into(),
             "–".into(),
         ]);
-        for (setting, timed) in SETTINGS.iter().zip(&row.frames) {
+        for ((setting, timed), valid) in SETTINGS.iter().zip(&row.frames).zip(&row.valid_shares) {
             let report = timed.report();
             let projections = report.projections;
             let share = projections.map(|n| n as f64 / row.surfels as f64);
@@ -298,7 +306,7 @@ fn table_2(rows: &[Measured]) -> Table {
                 median(timed.total()),
                 median(timed.quantity(|r| r.cull_ms)),
                 median(timed.quantity(|r| r.project_ms)),
-                report.valid_share().map_or("–".into(), |v| number(100.0 * v)),
+                valid.map_or("–".into(), |v| number(100.0 * v)),
                 projections.map_or("–".into(), |n| n.to_string()),
                 share.map_or("–".into(), number),
                 times(timed.ratio()),
@@ -346,8 +354,10 @@ fn figures(row: &Measured) -> Value {
         })
     };
     let p = row.paper;
-    let settings = SETTINGS.iter().zip(&row.frames).map(|(setting, timed)| {
+    let frames = row.frames.iter().zip(&row.valid_shares);
+    let settings = SETTINGS.iter().zip(frames).map(|(setting, (timed, valid))| {
         let mut value = frame_figures(timed);
+        value["valid_share"] = json!(valid);
         value["setting"] = json!(setting.name);
         value["ratio_to_published"] = ratio(timed.ratio());
         value

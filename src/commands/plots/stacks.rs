@@ -31,8 +31,7 @@ pub(crate) struct StackLabels<'a> {
     /// Of the parts, from the bottom up.
     pub(crate) parts: &'a [&'a str],
     pub(crate) total: &'a str,
-    /// Where no bar has one there is no second axis.
-    pub(crate) share: Option<&'a str>,
+    pub(crate) share: &'a str,
 }
 
 /// Of one plot, pixels.
@@ -51,7 +50,7 @@ pub(crate) fn stacks(plots: &[StackPlot], labels: &StackLabels<'_>) -> anyhow::R
         let mut entries: Vec<(String, RGBColor)> =
             labels.parts.iter().map(|n| (*n).to_owned()).zip(PARTS).collect();
         entries.push((labels.total.to_owned(), BLACK));
-        entries.extend(labels.share.map(|share| (share.to_owned(), SHARE)));
+        entries.push((labels.share.to_owned(), SHARE));
         entries.push(("least".to_owned(), LEAST));
         legend(&right, &entries)?;
         for (plot, area) in plots.iter().zip(left.split_evenly((rows, columns))) {
@@ -107,16 +106,14 @@ fn draw(
         .label_style(("sans-serif", 13))
         .draw()
         .map_err(failed)?;
-    if let Some(share) = labels.share {
-        chart
-            .configure_secondary_axes()
-            .y_desc(share)
-            .y_labels(6)
-            .y_label_formatter(&|y| format!("{y:.0}"))
-            .label_style(("sans-serif", 13))
-            .draw()
-            .map_err(failed)?;
-    }
+    chart
+        .configure_secondary_axes()
+        .y_desc(labels.share)
+        .y_labels(6)
+        .y_label_formatter(&|y| format!("{y:.0}"))
+        .label_style(("sans-serif", 13))
+        .draw()
+        .map_err(failed)?;
     for (i, stack) in plot.stacks.iter().enumerate() {
         let (left, right) = (i as f64 - 0.36, i as f64 + 0.36);
         let mut bottom = 0.0;

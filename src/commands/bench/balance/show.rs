@@ -77,13 +77,12 @@ fn plot(sweep: &Sweep, kind: &str, detail: &str) -> anyhow::Result<Plot> {
             least: Balance::of(&numbers).map(|b| b.least),
         }
     };
-    let share = sweep.shares_counted.then_some("valid, %");
     let labels = StackLabels {
         x: "surfels a leaf",
         y: "ms",
         parts: &["culling", "projection", "splatting", "cameras"],
         total: "whole layer",
-        share,
+        share: "valid, %",
     };
     Ok(Plot {
         name: format!("balance-{kind}-detail-{detail}"),
@@ -121,7 +120,7 @@ fn table(sweep: &Sweep, detail: &str) -> Table {
                 median(point.timed.total()),
                 median(point.timed.quantity(|r| r.cull_ms)),
                 median(point.timed.quantity(|r| r.project_ms)),
-                report.valid_share().map_or("–".into(), |v| format!("{:.1}", 100.0 * v)),
+                point.valid_share.map_or("–".into(), |v| format!("{:.1}", 100.0 * v)),
                 report.projections.map_or("–".into(), |n| n.to_string()),
                 times(point.timed.ratio()),
             ]);
@@ -135,6 +134,7 @@ pub(super) fn figures(sweep: &Sweep) -> Value {
     let point = |p: &Point| {
         let mut value = frame_figures(&p.timed);
         value["test"] = json!(p.test);
+        value["valid_share"] = json!(p.valid_share);
         value["detail"] = json!(p.detail.parse::<u32>().unwrap_or(0));
         value["leaf"] = json!(p.leaf);
         value["ratio_to_paper"] = ratio(p.timed.ratio());
