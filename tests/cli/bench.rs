@@ -78,10 +78,10 @@ fn the_balance_over_leaves() {
         let own: Vec<&Value> =
             points.iter().filter(|p| p["test"] == test && p["detail"] == 0).collect();
         let leaves: Vec<u64> = own.iter().map(|p| p["leaf"].as_u64().unwrap()).collect();
-        assert_eq!(leaves, [8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096]);
+        assert_eq!(leaves, [2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096]);
         let shares: Vec<f64> = own.iter().map(|p| p["valid_share"].as_f64().unwrap()).collect();
         assert!(shares.windows(2).all(|pair| pair[1] <= pair[0] + 0.01), "{test}: {shares:?}");
-        assert!(shares[0] > 2.0 * shares[9], "{test}: {shares:?}");
+        assert!(shares[2] > 2.0 * shares[11], "{test}: {shares:?}");
         let most = sweep["none"]["projections"].as_u64().unwrap();
         assert!(own.iter().all(|p| p["projections"].as_u64().unwrap() <= most), "{test}");
     }

@@ -50,7 +50,7 @@ enum What {
     /// thousand surfels: with everything as in the paper, the same with conservative box tests, and by our defaults, beside
     /// the paper's own figures (3.4 GHz Pentium 4, Quadro FX 3400).
     Tables(RunArgs),
-    /// Culling against projection: leaves of 8 to 4096, every box test, details and backends; mirror triangles and parts
+    /// Culling against projection: leaves of 2 to 4096, every box test, details and backends; mirror triangles and parts
     ///
     /// Says where the least total is on this machine and why, and which setting is nearest to the paper's 20 % of valid
     /// projections.

@@ -92,8 +92,8 @@ impl<'a> Bench<'a> {
         Rounds {
             repeat: self.args.repeat.unwrap_or(if quick { 5 } else { 9 }),
             warm_up: 1,
-            least_ms: if quick { 12.0 } else { 50.0 },
-            least_frames: if quick { 1 } else { 3 },
+            least_ms: if quick { 15.0 } else { 50.0 },
+            least_frames: if quick { 2 } else { 3 },
             most_ms: if quick { 1000.0 } else { 4000.0 },
         }
     }
