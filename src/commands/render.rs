@@ -125,6 +125,10 @@ impl HowArgs {
             };
             return Err(Error::input(option, "", problem, remedy));
         }
+        if self.gpu_path == "vertex" && method.info().id != "c3rc" {
+            let problem = format!("is for c3rc, and {} has one path", method.info().id);
+            return Err(Error::input("--gpu-path", "", problem, "leave it out"));
+        }
         let path = match self.gpu_path.as_str() {
             "vertex" => gpu::Path::Vertex,
             _ => gpu::Path::Compute,

@@ -13,7 +13,11 @@ use crate::visibility::Visibility;
 /// Which way a surface is curved, seen from the mirror side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bend {
-    /// Outward everywhere, or flat: every point has one image.
+    /// Not at all.
+    Flat,
+    /// In flat faces that meet at edges: images jump from one to the next.
+    Faceted,
+    /// Outward everywhere: every point has one image.
     Convex,
     /// Inward everywhere.
     Concave,

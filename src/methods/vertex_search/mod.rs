@@ -111,13 +111,19 @@ fn qualify(scene: &PreparedScene, params: &Params) -> Result<Vec<String>> {
         let (shapes, others) = parts::shapes(scene, mirror, params.integer("map-triangles"))?;
         for shape in shapes {
             let bend = match shape.bend {
+                Bend::Flat => "flat",
+                Bend::Faceted => "of flat faces: images are torn where they meet",
                 Bend::Convex => "convex",
                 Bend::Concave => "concave: far points have several images, of which one is drawn",
                 Bend::Mixed => {
                     "curved both ways: points may have several images, of which one is drawn"
                 }
             };
-            facts.push(format!("{} is star-shaped and {bend}", shape.name));
+            let name = match scene.mirrors[mirror].proxy {
+                Some(_) => format!("the proxy of {}", shape.name),
+                None => shape.name,
+            };
+            facts.push(format!("{name} is star-shaped and {bend}"));
         }
         facts.extend(others.iter().map(|name| not_shown(name)));
     }
@@ -142,11 +148,15 @@ fn reflectors(
             cx.step("mapping reflectors", mirror as f64 / scene.mirrors.len() as f64)?;
             let part = maps::reflector(scene, mirror, &shape, params.integer("map-side"));
             notes.extend(misfit(scene, mirror, &part));
-            if part.bend == Bend::Mixed {
-                let name = &part.name;
-                notes.push(format!(
+            let name = &part.name;
+            match part.bend {
+                Bend::Mixed => notes.push(format!(
                     "{name} is curved both ways: of several images of a point one is drawn"
-                ));
+                )),
+                Bend::Faceted => {
+                    notes.push(format!("{name} has flat faces: images are torn where they meet"));
+                }
+                _ => {}
             }
             list.push(part);
         }

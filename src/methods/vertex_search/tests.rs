@@ -52,8 +52,8 @@ fn surfaces_are_convex_concave_or_both() {
     for (name, expected) in [
         ("sphere", Bend::Convex),
         ("ellipsoid", Bend::Convex),
-        ("cube", Bend::Convex),
-        ("plane", Bend::Convex),
+        ("cube", Bend::Faceted),
+        ("plane", Bend::Flat),
         ("bowl", Bend::Concave),
         ("wave", Bend::Mixed),
         ("torus", Bend::Mixed),

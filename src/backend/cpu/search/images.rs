@@ -6,12 +6,15 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Done, Job, SearchBackend};
-use crate::camera::reflector::Found;
+use crate::camera::reflector::{Found, estalella};
 use crate::camera::three_ray::Rays;
 use crate::error::Result;
 use crate::geometry::Similarity;
 use crate::plan::search::{ReflectorPart, Search, SearchPass};
 use crate::scene::prepared::{PreparedScene, milliseconds};
+
+/// How zones are told: a property of the scene, whatever draws it.
+const ZONES: Search = Search::Estalella(estalella::Ends { iterations: 20, epsilon: 0.0 });
 
 /// The image of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,7 +119,7 @@ impl<'a> Reflecting<'a> {
     /// The images of points in scene space.
     pub(super) fn images(&self, points: &[Vec3], done: &mut Done) -> Result<Vec<Image>> {
         let (start, place) = (Instant::now(), self.place);
-        let found = self.find(points)?;
+        let found = self.find_by(self.pass.search, points)?;
         done.search_ms += milliseconds(start);
         let image = |(&p, f): (&Vec3, &Found)| place.image(place.local(p), f);
         let images: Vec<Image> = points.par_iter().zip(&found).map(image).collect();
@@ -127,11 +130,11 @@ impl<'a> Reflecting<'a> {
     }
 
     /// The local reflection points of points in scene space.
-    fn find(&self, points: &[Vec3]) -> Result<Vec<Found>> {
+    fn find_by(&self, search: Search, points: &[Vec3]) -> Result<Vec<Found>> {
         let place = self.place;
         let local: Vec<Vec3> = points.par_iter().map(|&p| place.local(p)).collect();
         let px = 1.0 / self.pass.eye.focal_px;
-        let (search, eye) = (self.pass.search, place.eye);
+        let eye = place.eye;
         self.backend.find(&Job { part: self.part, search, eye, px, points: &local })
     }
 
@@ -145,7 +148,7 @@ impl<'a> Reflecting<'a> {
             let lambda = f64::from(point.distance(found.point)) / length;
             (!found.hidden).then_some((rays, lambda))
         };
-        let found = self.find(points)?;
+        let found = self.find_by(ZONES, points)?;
         Ok(points.iter().zip(&found).filter_map(path).collect())
     }
 

@@ -45,6 +45,7 @@ pub(super) fn meshes(
 ) -> Result<Vec<Mesh>> {
     let window = longest_px.is_finite().then(|| window(reflecting.part, visibility)).flatten();
     done.notes.extend(zones::notes(reflecting)?);
+    let mut coarse: Vec<(f32, &str)> = Vec::new();
     let objects = reflecting.scene.objects.iter().enumerate();
     let mut list = Vec::new();
     for (i, object) in objects {
@@ -72,10 +73,44 @@ pub(super) fn meshes(
                     reflected_part(&whole(first + k, images), &mut pieces);
                 }
             }
+            let edge = longest_edge(reflecting, triangles, &images, visibility);
+            if edge > LONG_EDGE_PX {
+                coarse.push((edge, &object.name));
+            }
             Mesh { images, pieces, whole: true }
         });
     }
+    if let Some((edge, name)) = coarse.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+        let others = match coarse.len() {
+            1 => String::new(),
+            n => format!(" ({} more objects have such)", n - 1),
+        };
+        done.notes.push(format!(
+            "edges of {name} have images of {edge:.0} pixels, drawn straight{others}: --tessellate 8 divides them"
+        ));
+    }
     Ok(list)
+}
+
+/// Longer straight images of edges are worth a note, pixels.
+const LONG_EDGE_PX: f32 = 60.0;
+
+/// The longest image of an edge within the picture, pixels.
+fn longest_edge(
+    reflecting: &Reflecting<'_>,
+    triangles: &[[u32; 3]],
+    images: &[Image],
+    visibility: &Visibility,
+) -> f32 {
+    let size = Vec2::new(visibility.size.width as f32, visibility.size.height as f32);
+    let px = |i: u32| {
+        let image = &images[i as usize];
+        let px = reflecting.pass.eye.project_px(image.place).filter(|_| image.height > 0.0)?;
+        (px.cmpge(Vec2::ZERO).all() && px.cmple(size).all()).then_some(px)
+    };
+    let edge = |a: u32, b: u32| px(a).zip(px(b)).map_or(0.0, |(a, b)| a.distance(b));
+    let longest = |t: &[u32; 3]| edge(t[0], t[1]).max(edge(t[1], t[2])).max(edge(t[2], t[0]));
+    triangles.par_iter().map(longest).reduce(|| 0.0, f32::max)
 }
 
 /// The vertices' images between those of the corners of their cells (Estalella et al. section 5).

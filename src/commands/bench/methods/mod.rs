@@ -67,6 +67,10 @@ pub(crate) struct MethodsArgs {
 
 pub(crate) fn run(args: &MethodsArgs, cx: &Context) -> anyhow::Result<()> {
     check_json(args.json.as_ref())?;
+    if (1..3).contains(&args.frames) {
+        let problem = "flicker is measured over three frames";
+        return Err(Error::input("--frames", "", problem, "give 3 or more, or 0 for none").into());
+    }
     if !args.orbit.is_finite() {
         return Err(Error::input("--orbit", "", "is not a number", "give degrees").into());
     }
@@ -110,7 +114,10 @@ pub(crate) fn run(args: &MethodsArgs, cx: &Context) -> anyhow::Result<()> {
         }
     }
     write_picture(&file("reference.png"), &reference.picture)?;
-    write_bytes(&file("error-against-time.svg"), plot::errors(&entries)?.as_bytes())?;
+    write_bytes(
+        &file("error-against-time.svg"),
+        plot::errors(&ready.scene.name, &entries)?.as_bytes(),
+    )?;
     write_bytes(&file("methods.md"), table.as_bytes())?;
     write_json(Some(&file("methods.json")), &figures)?;
     write_json(args.json.as_ref(), &figures)?;
@@ -152,7 +159,7 @@ fn table(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> String {
     for entry in entries {
         let id = &entry.candidate.label;
         let row = match &entry.result {
-            Err(error) => format!("| {id} | {error} |||||||||||"),
+            Err(_) => format!("| {id} | refused | – | – | – | – | – | – | – | – | – |"),
             Ok(drawn) => {
                 let Measured { report, errors } = &drawn.measured;
                 let missing = errors.objects.as_ref().map(|o| 100.0 * o.total.missing_share());
@@ -177,8 +184,15 @@ fn table(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> String {
         };
         writeln!(text, "{row}").expect("strings grow");
     }
+    for entry in entries {
+        if let Err(error) = &entry.result {
+            writeln!(text, "\n{}: {error}.", entry.candidate.label).expect("strings grow");
+        }
+    }
     for (note, labels) in notes(entries) {
-        writeln!(text, "\n{}: {note}.", labels.join(", ")).expect("strings grow");
+        let drawn = entries.iter().filter(|entry| entry.result.is_ok()).count();
+        let whose = if labels.len() == drawn { "all".into() } else { labels.join(", ") };
+        writeln!(text, "\n{whose}: {note}.").expect("strings grow");
     }
     text
 }

@@ -52,7 +52,7 @@ pub(crate) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
             caption:
                 "FLIP over the time of a frame's reflections, each method's quality knobs turned."
                     .into(),
-            image: Image::Svg(plot::errors(&entries)?),
+            image: Image::Svg(plot::errors(&described.name, &entries)?),
         }),
     ];
     Ok(Section {

@@ -48,15 +48,26 @@ const SCALE: [usize; 2] = [256, 10];
 /// asked for, the steps of searches.
 pub(super) fn sheet(reference: &Reference, entries: &[Entry], steps: bool) -> Picture {
     let window = window(reference);
-    let maps = if steps { 2 } else { 1 };
     let longest = entries.iter().map(|e| e.candidate.label.len()).max().unwrap_or(0);
     let wide = window.size[0].max(8 * longest.max(18)) + GAP;
     let high = window.size[1] + GAP;
-    let cell = [wide, LINE + (1 + maps) * high];
     let rows = (entries.len() + 1).div_ceil(COLUMNS);
     let columns = (entries.len() + 1).div_ceil(rows);
-    let mut out = Picture::black(pixels(columns * wide), pixels(rows * cell[1] + maps * LINE));
-    let corner = |k: usize| [k % columns * cell[0], k / columns * cell[1]];
+    // The first cell is the reference's. Rows of cells without searches have no maps of steps.
+    let searched = |entry: &Entry| {
+        let planes = entry.result.as_ref().map(|drawn| &drawn.planes.steps);
+        planes.is_ok_and(|steps| steps.iter().any(|&n| n != NONE))
+    };
+    let has_steps = |row: usize| {
+        let own = (row * columns).max(1) - 1..((row + 1) * columns - 1).min(entries.len());
+        steps && entries[own].iter().any(searched)
+    };
+    let tall = |row: usize| LINE + (2 + usize::from(has_steps(row))) * high;
+    let top = |row: usize| (0..row).map(tall).sum::<usize>();
+    let foot = top(rows);
+    let scales = LINE * (1 + usize::from(steps));
+    let mut out = Picture::black(pixels(columns * wide), pixels(foot + scales));
+    let corner = |k: usize| [k % columns * wide, top(k / columns)];
     let below = |[x, y]: [usize; 2], n: usize| [x, y + LINE + n * high];
     let width = reference.picture.width as usize;
     write(&mut out, [GAP, 6], "reference");
@@ -72,13 +83,12 @@ pub(super) fn sheet(reference: &Reference, entries: &[Entry], steps: bool) -> Pi
         let map: Vec<[f32; 3]> =
             drawn.measured.errors.flip_map.iter().map(|&value| heat(value)).collect();
         paste(&mut out, below(at, 1), &map, width, window);
-        if steps {
+        if has_steps((k + 1) / columns) {
             let shade = |&n: &u32| if n == NONE { [0.0; 3] } else { heat(n as f32 / MOST_STEPS) };
             let map: Vec<[f32; 3]> = drawn.planes.steps.iter().map(shade).collect();
             paste(&mut out, below(at, 2), &map, width, window);
         }
     }
-    let foot = rows * cell[1];
     scale(&mut out, foot, "FLIP 0", "1");
     if steps {
         scale(&mut out, foot + LINE, "steps 0", &format!("{MOST_STEPS:.0} or more"));
