@@ -61,7 +61,10 @@ fn plot(sweep: &Sweep, kind: &str, detail: &str) -> anyhow::Result<Plot> {
         let numbers = sweep.numbers(test, detail);
         let stack =
             |(point, number): (&Point, &catoptric::analysis::balance::BalancePoint)| Stack {
-                label: point.leaf.to_string(),
+                label: match point.leaf {
+                    leaf if leaf >= 1024 => format!("{}k", leaf / 1024),
+                    leaf => leaf.to_string(),
+                },
                 parts: vec![
                     number.cull_ms,
                     number.project_ms,
