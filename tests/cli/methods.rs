@@ -18,7 +18,8 @@ fn searches_and_maps_draw_what_they_can() {
     }
     let run = folder.good(&format!("render {SMALL} --method estalella --json f.json"));
     let notes = folder.json("f.json")["notes"].clone();
-    assert_eq!(notes[0], "teapot rim is not star-shaped: it shows the environment only");
+    let has = |note: &str| notes.as_array().unwrap().iter().any(|own| own == note);
+    assert!(has("teapot rim is not star-shaped: it shows the environment only"), "{notes}");
     assert!(run.out.contains("note: teapot handle is not star-shaped"), "{}", run.out);
     folder.good(&format!(
         "render {BALL} {SMALL} --method roger-holzschuch --primitive points --point square1 \
@@ -101,6 +102,8 @@ fn what_is_known_of_a_mirror_is_said() {
     assert!(out.contains("note: --grid and --tessellate are for triangles"), "{out}");
     let two = "--mirror sphere --mirror torus --proxy none --proxy ellipsoid";
     assert!(draw(two).out.contains("the proxy of torus"));
+    let out = folder.good("render --size 640x360 --surfels 20000 --method estalella").out;
+    assert!(out.contains(" pixels, drawn straight (") && out.contains("--tessellate 8"), "{out}");
     let line = format!("render --object knot {SMALL} --method estalella");
     folder.refused(
         &format!("{line} --mirror sphere --proxy torus"),
