@@ -160,6 +160,23 @@ fn cameras<'a>(pass: &'a SplatPass<'_>) -> Vec<&'a CameraInstance> {
     pass.cameras.iter().filter(|camera| camera.object == 0).collect()
 }
 
+/// How many boxes the cameras meet, one box at a time.
+fn meetings(boxes: &LeafBoxes, cameras: &[&CameraInstance], test: BoxTest) -> usize {
+    let mut met = 0;
+    for camera in cameras {
+        let Volume::Three(volume) = &camera.volume else { continue };
+        let (origin, [lo, hi]) = (volume.origin(), camera.lambda);
+        for i in 0..boxes.center[0].len() {
+            let one = Boxes {
+                center: [0, 1, 2].map(|k| boxes.center[k][i] - origin[k]),
+                half: [0, 1, 2].map(|k| boxes.half[k][i]),
+            };
+            met += usize::from(volume.meets(test, &one, lo, hi).meets);
+        }
+    }
+    met
+}
+
 /// All leaves of the tree against some cameras, without walking it.
 fn box_tests(criterion: &mut Criterion) {
     let setup = Setup::new();
@@ -190,21 +207,6 @@ fn box_tests(criterion: &mut Criterion) {
         }
         met
     }
-    fn one(boxes: &LeafBoxes, cameras: &[&CameraInstance], test: BoxTest) -> usize {
-        let mut met = 0;
-        for camera in cameras {
-            let Volume::Three(volume) = &camera.volume else { continue };
-            let (origin, [lo, hi]) = (volume.origin(), camera.lambda);
-            for i in 0..boxes.center[0].len() {
-                let one = Boxes {
-                    center: [0, 1, 2].map(|k| boxes.center[k][i] - origin[k]),
-                    half: [0, 1, 2].map(|k| boxes.half[k][i]),
-                };
-                met += usize::from(volume.meets(test, &one, lo, hi).meets);
-            }
-        }
-        met
-    }
     let level = simd_level();
     let mut group = criterion.benchmark_group("box tests");
     group.throughput(Throughput::Elements((some.len() * boxes.center[0].len()) as u64));
@@ -218,7 +220,7 @@ fn box_tests(criterion: &mut Criterion) {
             b.iter(|| dispatch!(level, simd => lanes(simd, black_box(&boxes), &some, test)));
         });
         group.bench_function(format!("naive: {name}, one box at a time"), |b| {
-            b.iter(|| one(black_box(&boxes), &some, test));
+            b.iter(|| meetings(black_box(&boxes), &some, test));
         });
     }
     group.finish();
@@ -287,21 +289,7 @@ fn culling(criterion: &mut Criterion) {
     let pass = splat_pass(&setup, "slab");
     let (all, boxes) = (cameras(&pass), LeafBoxes::new(&setup.scene.clouds[0].tree));
     group.bench_function("naive: slab on every leaf", |b| {
-        b.iter(|| {
-            let mut met = 0;
-            for camera in &all {
-                let Volume::Three(volume) = &camera.volume else { continue };
-                let (origin, [lo, hi]) = (volume.origin(), camera.lambda);
-                for i in 0..boxes.center[0].len() {
-                    let one = Boxes {
-                        center: [0, 1, 2].map(|k| boxes.center[k][i] - origin[k]),
-                        half: [0, 1, 2].map(|k| boxes.half[k][i]),
-                    };
-                    met += usize::from(volume.meets(BoxTest::Slab, &one, lo, hi).meets);
-                }
-            }
-            met
-        });
+        b.iter(|| meetings(black_box(&boxes), &all, BoxTest::Slab));
     });
     group.finish();
 }

@@ -75,11 +75,16 @@ impl Drawing<'_> {
         for (k, object) in self.objects.iter().enumerate() {
             for (i, corners) in object.triangles.iter().enumerate() {
                 let places = corners.map(|c| object.places[c as usize]);
-                let Some(rows) = rows(self.eye, places) else { continue };
-                let first = pixels.partition_point(|&pixel| pixel / width < rows[0]);
-                let own = pixels[first..].iter().take_while(|&&pixel| pixel / width <= rows[1]);
-                for (at, &pixel) in own.enumerate() {
+                let Some([low, high]) = window(self.eye, places) else { continue };
+                let first = pixels.partition_point(|&pixel| middle(pixel, width).y < low.y);
+                for (at, &pixel) in pixels[first..].iter().enumerate() {
                     let px = middle(pixel, width);
+                    if px.y > high.y {
+                        break;
+                    }
+                    if px.x < low.x || px.x > high.x {
+                        continue;
+                    }
                     let Some(weights) = linear_weights(self.eye, places, px) else { continue };
                     let distances = corners.map(|c| object.distances[c as usize]);
                     let distance = (0..3).map(|k| distances[k] * weights[k]).sum::<f32>();
@@ -163,13 +168,11 @@ fn middle(pixel: usize, width: usize) -> Vec2 {
     Vec2::new((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5)
 }
 
-/// The first and last row of pixels that a triangle may show in; `None` if it is not drawn.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-fn rows(eye: &Eye, places: [Vec3; 3]) -> Option<[usize; 2]> {
+/// Where a triangle is in the picture, its corners in pixels; `None` if it is not drawn.
+fn window(eye: &Eye, places: [Vec3; 3]) -> Option<[Vec2; 2]> {
     let [a, b, c] = places.map(|p| eye.project_px(p).filter(|px| px.is_finite()));
-    let (low, high) = (a?.min(b?).min(c?), a?.max(b?).max(c?));
-    let row = |y: f32| y.clamp(0.0, eye.size.height as f32) as usize;
-    (low.y <= high.y).then(|| [row(low.y), row(high.y)])
+    let (a, b, c) = (a?, b?, c?);
+    Some([a.min(b).min(c), a.max(b).max(c)])
 }
 
 fn depth(eye: &Eye, p: Vec3) -> f32 {

@@ -73,8 +73,10 @@ pub(super) fn meshes(
                     reflected_part(&whole(first + k, images), &mut pieces);
                 }
             }
+            // A mirror that is not in the picture is not divided for, and shows nothing wrong.
+            let drawn_straight = longest_px.is_infinite();
             let edge = longest_edge(reflecting, triangles, &images, visibility);
-            if edge > LONG_EDGE_PX {
+            if drawn_straight && edge > LONG_EDGE_PX {
                 coarse.push((edge, &object.name));
             }
             Mesh { images, pieces, whole: true }
