@@ -87,7 +87,7 @@ const NOTE: &str = "Reflections of a frame by c3rc (its defaults; quality draft;
 const CURVED: &str = "Curvature: the scene's first mirror is replaced by a square sheet of its diagonal with the principal curvatures of \
     a paraboloid at its middle, upright at the mirror's place; positive bulges towards the eye. Its unit is one by the sheet's side.";
 
-/// What every row is measured against.
+/// A scene of a row, or what every row is measured against.
 struct Base {
     scene: PreparedScene,
     eye: Eye,
@@ -170,8 +170,7 @@ fn over_surfels(bench: Bench<'_>, described: &Scene, base: &Base) -> anyhow::Res
     for (i, &count) in counts.iter().enumerate() {
         let part = bench.turn(i, counts.len());
         part.step(0.0)?;
-        let scene = part.prepared(described, count, KdTreeLimits::default().leaf_points)?;
-        let eye = part.args.place.eye(&scene)?;
+        let Base { scene, eye } = Base::new(part, described, count)?;
         let (bytes, times) = (scene.surfel_bytes(), scene.times);
         let megabytes = |bytes: usize| number(bytes as f64 * 1e-6);
         let ms = |name, ms: f64| (name, number(ms), json!(ms));
@@ -204,10 +203,9 @@ fn over_triangles(
         let part = bench.turn(i, counts.len());
         part.step(0.0)?;
         let Some(scene) = with_mirror_triangles(described, count) else { return Ok(None) };
-        let scene = part.prepared(&scene, surfels, KdTreeLimits::default().leaf_points)?;
-        let eye = part.args.place.eye(&scene)?;
-        let timed = measure(part.part(0.3, 1.0), base, &scene, &eye)?;
-        rows.push(Row { x: scene.mirror_triangle_count() as f64, timed, more: Vec::new() });
+        let own = Base::new(part, &scene, surfels)?;
+        let timed = measure(part.part(0.3, 1.0), base, &own.scene, &own.eye)?;
+        rows.push(Row { x: own.scene.mirror_triangle_count() as f64, timed, more: Vec::new() });
     }
     let x = Axis { label: "mirror triangles", log: true };
     Ok(Some(curve("growth-triangles", "Reflections over the mirror's triangles", x, rows)))
@@ -256,9 +254,8 @@ fn over_curvature(
         let (low, high) = (mirror.mesh.bounds().min, mirror.mesh.bounds().max);
         mirror.mesh = Arc::new(sheet(curvature, 0.5 * (low + high), 0.5 * (high - low).length()));
         (mirror.source, mirror.proxy) = (None, None);
-        let scene = part.prepared(&scene, surfels, KdTreeLimits::default().leaf_points)?;
-        let eye = part.args.place.eye(&scene)?;
-        let timed = measure(part.part(0.3, 1.0), base, &scene, &eye)?;
+        let own = Base::new(part, &scene, surfels)?;
+        let timed = measure(part.part(0.3, 1.0), base, &own.scene, &own.eye)?;
         rows.push(Row { x: f64::from(curvature), timed, more: Vec::new() });
     }
     let x = Axis { label: "curvature of the sheet by its side", log: false };
