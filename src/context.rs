@@ -11,22 +11,82 @@ pub trait Progress: Send + Sync {
     fn report(&self, stage: &str, done: f64);
 }
 
-/// What long work is given: whether to go on, and where to say how far it is.
+/// What long work is given: whether to go on, where to say how far it is, and how much memory it may take.
 #[derive(Clone, Default)]
 pub struct Context {
     cancel: Arc<AtomicBool>,
     progress: Option<Arc<dyn Progress>>,
+    memory: Option<MemoryLimit>,
 }
+
+/// How much memory the program may take.
+#[derive(Clone, Copy, Debug)]
+pub struct MemoryLimit {
+    /// All of the program, bytes.
+    pub bytes: u64,
+    /// Bytes that the program has taken so far.
+    pub taken: fn() -> u64,
+}
+
+/// Bytes that are taken without asking how many others there are.
+const SMALL: u64 = 1 << 20;
 
 impl Context {
     /// A context that reports to `progress`.
     pub fn new(progress: Arc<dyn Progress>) -> Self {
-        Self { cancel: Arc::default(), progress: Some(progress) }
+        Self { progress: Some(progress), ..Self::default() }
     }
 
     /// A context without progress that this flag cancels.
     pub fn cancelled_by(flag: Arc<AtomicBool>) -> Self {
-        Self { cancel: flag, progress: None }
+        Self { cancel: flag, ..Self::default() }
+    }
+
+    /// The same with another limit on its memory; `None`: none.
+    #[must_use]
+    pub fn with_memory(self, memory: Option<MemoryLimit>) -> Self {
+        Self { memory, ..self }
+    }
+
+    /// The same without progress.
+    #[must_use]
+    pub fn silent(&self) -> Self {
+        Self { progress: None, ..self.clone() }
+    }
+
+    /// The limit on its memory.
+    pub fn memory(&self) -> Option<MemoryLimit> {
+        self.memory
+    }
+
+    /// Whether there is room for so many bytes more, to be asked before they are taken. `name` is the file or option that
+    /// asks for them, `what` they are for.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the limit would be passed.
+    pub fn room_for(&self, name: &str, what: &str, bytes: u64) -> Result<()> {
+        let Some(MemoryLimit { bytes: limit, taken }) = self.memory else { return Ok(()) };
+        // Little things are not worth the question.
+        if bytes < SMALL && bytes < limit {
+            return Ok(());
+        }
+        let taken = taken();
+        if taken.saturating_add(bytes) <= limit {
+            return Ok(());
+        }
+        let gigabytes = |bytes: u64| bytes as f64 * 1e-9;
+        let problem = format!(
+            "{what} need about {:.2} GB of memory, and of the {:.2} GB allowed {:.2} are taken",
+            gigabytes(bytes),
+            gigabytes(limit),
+            gigabytes(taken)
+        );
+        Err(Error::input(
+            name,
+            "",
+            problem,
+            "choose something smaller, or allow more (--max-memory)",
+        ))
     }
 
     /// The flag that cancels everything that was given this context.
@@ -52,5 +112,22 @@ impl Context {
             progress.report(stage, done);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_refused_by_name() {
+        let limit = MemoryLimit { bytes: 3_000_000_000, taken: || 1_000_000_000 };
+        let cx = Context::default().with_memory(Some(limit));
+        assert!(cx.room_for("a.ply", "9 points", 2_000_000_000).is_ok());
+        let error = cx.room_for("a.ply", "9 points", 2_000_000_001).unwrap_err().to_string();
+        let expected = "a.ply: 9 points need about 2.00 GB of memory, and of the 3.00 GB allowed 1.00 are taken; choose";
+        assert!(error.starts_with(expected), "{error}");
+        assert!(cx.room_for("a.ply", "9 points", u64::MAX).is_err());
+        assert!(cx.with_memory(None).room_for("a.ply", "9 points", u64::MAX).is_ok());
     }
 }

@@ -30,6 +30,9 @@ use commands::{SceneArgs, say, with_method_flags};
 struct Cli {
     #[command(subcommand)]
     command: Option<Verb>,
+    /// Memory that may be taken, such as 8G (default: 80 % of what is free); what needs more is refused
+    #[arg(long, global = true, value_name = "SIZE", value_parser = commands::memory::parse)]
+    max_memory: Option<u64>,
 }
 
 #[derive(Subcommand, Debug)]
@@ -57,7 +60,8 @@ fn main() -> ExitCode {
         Err(error) => error.exit(),
     };
     let bars = Arc::new(Bars::default());
-    let cx = Context::new(Arc::clone(&bars) as Arc<dyn Progress>);
+    let cx = Context::new(Arc::clone(&bars) as Arc<dyn Progress>)
+        .with_memory(commands::memory::limit(cli.max_memory));
     let cancel = cx.cancel_flag();
     // A second Ctrl-C does not wait for the stage to end; outputs are renamed into place, so none is broken.
     let handler = ctrlc::set_handler(move || {

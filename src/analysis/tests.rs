@@ -32,6 +32,7 @@ fn scene(surfels: usize) -> PreparedScene {
         name: name.into(),
         mesh: mesh(name, 2000),
         source: None,
+        points: None,
         transform,
         paint: Paint::Constant(Vec3::splat(0.5)),
         density: 1.0,
@@ -63,6 +64,7 @@ fn scene(surfels: usize) -> PreparedScene {
         ],
         environment: Environment::Constant(Vec3::ONE),
         light: Light { to_sun: Vec3::Y, sun: Vec3::ONE, ambient: Vec3::ONE },
+        notes: vec![],
     };
     let options = PrepareOptions { surfels, ..PrepareOptions::default() };
     PreparedScene::new(&scene, &options, &Context::default()).unwrap()

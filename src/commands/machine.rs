@@ -19,7 +19,7 @@ pub(crate) fn machine(adapters: &Value) -> Value {
         "cores": std::thread::available_parallelism().ok().map(std::num::NonZero::get),
         "threads": rayon::current_num_threads(),
         "simd": simd_name(),
-        "memory_bytes": super::memory::line("MemTotal:"),
+        "memory_bytes": super::memory::total(),
         "system": format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
         "adapters": adapters,
     })

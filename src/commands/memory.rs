@@ -1,49 +1,80 @@
-//! Refuses what this machine's memory cannot hold, before the system ends the program without a word.
+//! How much memory the program may take: a share of the machine's, or as much as the user says. What needs more is refused
+//! before it is taken, before the system ends the program without a word.
 
 use catoptric::camera::eye::ImageSize;
-use catoptric::{Error, Result};
+use catoptric::context::MemoryLimit;
+use catoptric::{Context, Result};
+use sysinfo::{MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, RefreshKind, System};
 
-/// Peak bytes a surfel (measured between 1 and 10 million: 126).
-const SURFEL_BYTES: u64 = 130;
 /// Peak bytes a pixel (measured at 3840 x 2160 with AOVs: 165).
 const PIXEL_BYTES: u64 = 170;
+/// Of what is free, so much is taken at most, in percent: estimates are not exact, and others live here, too.
+const SHARE: u64 = 80;
+
+/// The limit that the user asks for, or else a share of what the machine has free.
+pub(crate) fn limit(asked: Option<u64>) -> Option<MemoryLimit> {
+    let bytes = asked.or_else(|| {
+        let free = free()?;
+        Some(taken().saturating_add(free / 100 * SHARE))
+    })?;
+    Some(MemoryLimit { bytes, taken })
+}
+
+/// Parses what `--max-memory` is given: bytes, or a number of K, M, G or T (times 1024), with or without B or iB.
+pub(crate) fn parse(text: &str) -> Result<u64, String> {
+    let wrong = || "give a size such as 8G or 500M".to_owned();
+    let upper = text.trim().to_ascii_uppercase();
+    let plain = upper.strip_suffix('B').map_or(&*upper, |t| t.strip_suffix('I').unwrap_or(t));
+    let split = plain.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(plain.len());
+    let (number, unit) = plain.split_at(split);
+    let number: f64 = number.trim().parse().map_err(|_| wrong())?;
+    let power = match unit {
+        "" => 0,
+        "K" => 1,
+        "M" => 2,
+        "G" => 3,
+        "T" => 4,
+        _ => return Err(wrong()),
+    };
+    let bytes = number * 1024_f64.powi(power);
+    if !(1.0..=1e18).contains(&bytes) {
+        return Err(wrong());
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in that range")]
+    Ok(bytes as u64)
+}
 
 /// # Errors
-/// The scene or the picture is larger than the free memory, where the system says how much that is.
-pub(crate) fn check(surfels: usize, size: ImageSize) -> Result<()> {
-    free().map_or(Ok(()), |free| fits(surfels, size, free))
+/// The picture is larger than the memory that may be taken.
+pub(crate) fn check(size: ImageSize, cx: &Context) -> Result<()> {
+    let bytes = PIXEL_BYTES.saturating_mul(size.pixels() as u64);
+    cx.room_for("--size", &format!("{} x {} pixels", size.width, size.height), bytes)
 }
 
-fn fits(surfels: usize, size: ImageSize, free: u64) -> Result<()> {
-    let surfel_bytes = SURFEL_BYTES.saturating_mul(surfels as u64);
-    let pixel_bytes = PIXEL_BYTES.saturating_mul(size.pixels() as u64);
-    if surfel_bytes.saturating_add(pixel_bytes) <= free {
-        return Ok(());
-    }
-    let (name, what) = if surfel_bytes > pixel_bytes {
-        ("--surfels", format!("{surfels} surfels"))
-    } else {
-        ("--size", format!("{} x {} pixels", size.width, size.height))
-    };
-    let gigabytes = |bytes: u64| bytes as f64 * 1e-9;
-    let problem = format!(
-        "{what} need {:.1} GB of memory, of which {:.1} are free",
-        gigabytes(surfel_bytes.max(pixel_bytes)),
-        gigabytes(free)
-    );
-    Err(Error::input(name, "", problem, "choose fewer"))
-}
-
-/// Bytes that programs may still take; `None` where the system does not say.
+/// Bytes that programs may still take, also within a container; `None` where the system does not say.
 fn free() -> Option<u64> {
-    line("MemAvailable:")
+    let system = system()?;
+    let free = system.available_memory();
+    let free = system.cgroup_limits().map_or(free, |limits| free.min(limits.free_memory));
+    (free > 0).then_some(free)
 }
 
-/// A line of what Linux says about its memory, bytes: elsewhere it would take a system call, which safe Rust has not.
-pub(crate) fn line(name: &str) -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
-    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.saturating_mul(1024))
+/// Bytes of the machine; `None` where the system does not say.
+pub(crate) fn total() -> Option<u64> {
+    Some(system()?.total_memory()).filter(|total| *total > 0)
+}
+
+fn system() -> Option<System> {
+    let memory = MemoryRefreshKind::nothing().with_ram();
+    System::new_with_specifics(RefreshKind::nothing().with_memory(memory)).ok()
+}
+
+/// Bytes that this program has taken.
+fn taken() -> u64 {
+    let (Ok(own), Ok(mut system)) = (sysinfo::get_current_pid(), System::new()) else { return 0 };
+    let kind = ProcessRefreshKind::nothing().with_memory();
+    system.refresh_processes_specifics(ProcessesToUpdate::Some(&[own]), false, kind);
+    system.process(own).map_or(0, sysinfo::Process::memory)
 }
 
 #[cfg(test)]
@@ -51,28 +82,41 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_larger_part_is_named() {
-        let size = |width, height| ImageSize { width, height };
-        let refusal = |surfels, size| fits(surfels, size, 8_000_000_000).unwrap_err().to_string();
-        assert!(fits(3_000_000, size(1280, 720), 1_000_000_000).is_ok());
-        assert!(
-            refusal(2_000_000_000, size(16, 9))
-                .starts_with("--surfels: 2000000000 surfels need 260.0 GB")
-        );
-        assert!(
-            refusal(10, size(16_384, 16_384))
-                .starts_with("--size: 16384 x 16384 pixels need 45.6 GB")
-        );
-        // Each fits alone, but not both.
-        assert!(fits(40_000_000, size(16, 9), 8_000_000_000).is_ok());
-        assert!(refusal(40_000_000, size(8192, 4096)).contains("--size"));
-        assert!(refusal(usize::MAX, size(16, 9)).contains("--surfels"));
+    fn sizes_have_units() {
+        for (text, bytes) in [
+            ("1", 1),
+            ("500M", 500 << 20),
+            ("8G", 8 << 30),
+            ("8GB", 8 << 30),
+            ("1.5gib", 3 << 29),
+            ("2 T", 2 << 40),
+            ("64k", 64 << 10),
+        ] {
+            assert_eq!(parse(text), Ok(bytes), "{text}");
+        }
+        for bad in ["", "G", "0", "-1G", "nan", "inf", "1e40", "8X", "8GG", "1G2"] {
+            assert!(parse(bad).is_err(), "{bad}");
+        }
     }
 
-    #[cfg(target_os = "linux")]
     #[test]
-    fn linux_says_what_is_free() {
-        let free = free().unwrap();
-        assert!((1 << 20..1 << 50).contains(&free), "{free}");
+    fn the_program_knows_what_it_takes() {
+        let before = taken();
+        assert!((1 << 20..1 << 36).contains(&before), "{before}");
+        let ballast = vec![1u8; 200 << 20];
+        let more = taken() - before;
+        assert!((150 << 20..400 << 20).contains(&more), "{more}");
+        assert_eq!(ballast[1 << 20], 1);
+        let limit = limit(None).unwrap();
+        assert!(limit.bytes > taken() && limit.bytes < total().unwrap(), "{limit:?}");
+        assert_eq!(super::limit(Some(5)).unwrap().bytes, 5);
+    }
+
+    #[test]
+    fn large_pictures_are_refused() {
+        let cx = Context::default().with_memory(Some(MemoryLimit { bytes: 4 << 30, taken: || 0 }));
+        assert!(check(ImageSize { width: 1280, height: 720 }, &cx).is_ok());
+        let error = check(ImageSize { width: 16_384, height: 16_384 }, &cx).unwrap_err();
+        assert!(error.to_string().starts_with("--size: 16384 x 16384 pixels need about 45.6"));
     }
 }

@@ -5,7 +5,7 @@ pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod info;
 mod machine;
-mod memory;
+pub(crate) mod memory;
 pub(crate) mod paths;
 mod plots;
 pub(crate) mod render;
@@ -25,7 +25,8 @@ use catoptric::image::io::write_bytes;
 use catoptric::methods::{METHODS, Method, MethodInfo, Params, method};
 use catoptric::scene::arrange::{self, Request};
 use catoptric::scene::description::Scene;
-use catoptric::scene::prepared::{DEFAULT_SURFELS, PrepareOptions, PreparedScene};
+use catoptric::scene::load::{ReadOptions, UpAxis};
+use catoptric::scene::prepared::{self, DEFAULT_SURFELS, PrepareOptions, PreparedScene};
 use catoptric::{Context, Error, Result};
 use clap::{Arg, ArgMatches, Args, Command};
 use glam::DVec3;
@@ -65,7 +66,8 @@ pub(crate) struct SceneArgs {
 /// What stands where, and who looks at it.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlaceArgs {
-    /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply) to be set beside the teapot
+    /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply, .stl, .gltf, .glb) to be set beside
+    /// the teapot; one model that has mirrors of its own is a scene as it is
     #[arg(value_name = "SCENE|MODEL")]
     pub(crate) inputs: Vec<String>,
     /// Mirror: a mesh file, used as placed, or a built-in shape; repeatable
@@ -78,6 +80,8 @@ pub(crate) struct PlaceArgs {
     /// Object: a mesh file, used as placed, or a built-in shape; repeatable
     #[arg(long, value_name = "FILE|NAME")]
     pub(crate) object: Vec<String>,
+    #[command(flatten)]
+    pub(crate) read: ReadArgs,
     /// Seed of the sampling
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     pub(crate) seed: u64,
@@ -97,6 +101,49 @@ pub(crate) struct PlaceArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u64).range(1..=MAX_THREADS))]
     threads: Option<u64>,
+}
+
+/// How files are read.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub(crate) struct ReadArgs {
+    /// Which axis is up in models: y, or z as in CAD and surveys (default: y; z for .las and .laz)
+    #[arg(long, value_name = "AXIS")]
+    up: Option<Axis>,
+    /// Let scenes and models name files outside of their own folder
+    #[arg(long)]
+    allow_outside: bool,
+}
+
+impl ReadArgs {
+    /// The rest of a request is as nothing was said.
+    pub(crate) fn request(self) -> Request {
+        let read = ReadOptions { outside: self.allow_outside };
+        Request { up: self.up.map(Into::into), read, ..Request::default() }
+    }
+}
+
+/// See [`UpAxis`].
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Axis {
+    Y,
+    Z,
+}
+
+impl From<Axis> for UpAxis {
+    fn from(axis: Axis) -> Self {
+        match axis {
+            Axis::Y => Self::Y,
+            Axis::Z => Self::Z,
+        }
+    }
+}
+
+/// Says on standard error what should be known about the files that were read.
+pub(crate) fn tell(notes: &[String]) {
+    use std::io::Write as _;
+    for note in notes {
+        let _ = writeln!(std::io::stderr(), "note: {note}");
+    }
 }
 
 fn point(text: &str) -> Result<DVec3, String> {
@@ -140,6 +187,7 @@ impl PlaceArgs {
             mirror: Vec::new(),
             proxy: Vec::new(),
             object: Vec::new(),
+            read: ReadArgs::default(),
             seed: 1,
             eye: None,
             target: None,
@@ -150,8 +198,9 @@ impl PlaceArgs {
     }
 
     /// What can be refused before anything is read, and the threads. `surfels`: as many as will be made.
-    pub(crate) fn begin(&self, surfels: usize) -> anyhow::Result<()> {
-        memory::check(surfels, self.size)?;
+    pub(crate) fn begin(&self, surfels: usize, cx: &Context) -> anyhow::Result<()> {
+        prepared::check_room(surfels, cx)?;
+        memory::check(self.size, cx)?;
         begin(self.threads)
     }
 
@@ -165,6 +214,7 @@ impl PlaceArgs {
             eye: self.eye,
             target: self.target,
             fov_y_deg: self.fov,
+            ..self.read.request()
         }
     }
 
@@ -191,8 +241,8 @@ impl SceneArgs {
     }
 
     /// See [`PlaceArgs::begin`].
-    pub(crate) fn begin(&self) -> anyhow::Result<()> {
-        self.place.begin(self.surfels)
+    pub(crate) fn begin(&self, cx: &Context) -> anyhow::Result<()> {
+        self.place.begin(self.surfels, cx)
     }
 
     /// How it is to be prepared. `leaf` is a preset's leaf size.
@@ -210,10 +260,11 @@ impl SceneArgs {
 
     /// Loads and prepares. `leaf` is a preset's leaf size.
     pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
-        self.begin()?;
+        self.begin(cx)?;
         let start = Instant::now();
         let described = arrange::scene(&self.place.request(), cx)?;
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        tell(&described.notes);
         let scene = PreparedScene::new(&described, &self.prepare_options(leaf), cx)?;
         let eye = self.place.eye(&scene)?;
         Ok(Ready { scene, eye, load_ms, described })

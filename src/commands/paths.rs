@@ -17,7 +17,9 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{MAX_THREADS, begin, check_apart, check_json, ms, point, say, write_json};
+use super::{
+    MAX_THREADS, ReadArgs, begin, check_apart, check_json, ms, point, say, tell, write_json,
+};
 
 /// Find every way of light from an eye over the mirrors to each point of a file
 ///
@@ -27,7 +29,8 @@ use super::{MAX_THREADS, begin, check_apart, check_json, ms, point, say, write_j
 #[derive(Args, Debug)]
 #[command(after_long_help = COLUMNS)]
 pub(crate) struct PathsArgs {
-    /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply) to be set beside the teapot
+    /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply, .stl, .gltf, .glb) to be set beside
+    /// the teapot; one model that has mirrors of its own is a scene as it is
     #[arg(value_name = "SCENE|MODEL")]
     inputs: Vec<String>,
     /// Mirror: a mesh file, used as placed, or a built-in shape; repeatable
@@ -36,6 +39,8 @@ pub(crate) struct PathsArgs {
     /// Object that may stand in the way: a mesh file, used as placed, or a built-in shape; repeatable
     #[arg(long, value_name = "FILE|NAME")]
     object: Vec<String>,
+    #[command(flatten)]
+    read: ReadArgs,
     /// Eye position, world space (default: the scene's)
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     eye: Option<DVec3>,
@@ -102,10 +107,11 @@ pub(crate) fn run(args: &PathsArgs, cx: &Context) -> anyhow::Result<()> {
         inputs: args.inputs.clone(),
         mirrors: args.mirror.clone(),
         objects: args.object.clone(),
-        ..Request::default()
+        ..args.read.request()
     };
     let mut reader = PointReader::open(&args.points)?;
     let scene = arrange::scene(&request, cx)?;
+    tell(&scene.notes);
     let eye = args.eye.unwrap_or(scene.eye.position);
     let paths = PathScene::new(&scene);
     let options = PathOptions {

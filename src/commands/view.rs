@@ -85,7 +85,7 @@ pub(crate) fn run(
     }
     check_apart(&[("--screenshot", args.screenshot.as_deref()), ("--json", args.json.as_deref())])?;
     let (method, params, leaf) = chosen_method(&args.how(), matches)?;
-    args.scene.begin()?;
+    args.scene.begin(cx)?;
     let said = |id: &str| {
         matches.try_contains_id(id).is_ok_and(|known| known)
             && matches.value_source(id) == Some(ValueSource::CommandLine)
@@ -107,6 +107,7 @@ pub(crate) fn run(
         frames: args.frames,
         screenshot: args.screenshot.clone(),
         started,
+        memory: cx.memory(),
     };
     let Some(outcome) = open(&opening, cx)? else { return Ok(()) };
     write_json(args.json.as_ref(), &figures(&outcome))?;

@@ -46,6 +46,9 @@ pub enum MeshDefect {
         /// How many there should be.
         vertices: usize,
     },
+    /// More vertices than an index of 32 bits can name.
+    #[error("has more than 4294967295 vertices")]
+    TooMany,
     /// All triangles are degenerate.
     #[error("has zero area")]
     ZeroArea,

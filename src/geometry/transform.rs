@@ -44,6 +44,14 @@ impl Similarity {
         self.rotation.conjugate() * d
     }
 
+    /// Undoes it.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.conjugate();
+        let scale = self.scale.recip();
+        Self { rotation, translation: rotation * (self.translation * -scale), scale }
+    }
+
     /// First `self`, then `next`.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {

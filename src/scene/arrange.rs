@@ -1,24 +1,25 @@
 //! The scene that a command line asks for: a scene, models beside the teapot, or files as placed.
 
-use std::f64::consts::TAU;
 use std::path::Path;
-use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
 
-use super::description::{EyeDescription, Mirror, Object, Paint, PatternKind, Scene, Source};
+use super::description::{EyeDescription, Mirror, Object, Paint, Scene};
 use super::file::{self, DEFAULT_FOV_Y_DEG, DEFAULT_SKY, PARALLEL, default_light, plain_paint};
-use super::fit::{fit, world_bounds};
-use super::library::{Library, stem, unique};
+use super::fit::fit;
+use super::library::{Found, Library, stem, unique};
+use super::load::{ReadOptions, UpAxis};
 use super::{builtin, load};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::{Mesh, Similarity};
+use crate::geometry::Similarity;
+
+mod models;
 
 /// What the command line says about the scene; all of it may be empty.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
-    /// One scene (a built-in name or a `.toml` file), or any number of models (`.obj`, `.ply`).
+    /// One scene (a built-in name or a `.toml` file), or any number of models (see [`load::EXTENSIONS`]).
     pub inputs: Vec<String>,
     /// Instead of the scene's mirrors: files, as placed, and built-in shapes, where the teapot stands.
     pub mirrors: Vec<String>,
@@ -33,11 +34,27 @@ pub struct Request {
     pub target: Option<DVec3>,
     /// Instead of the scene's; vertical, degrees.
     pub fov_y_deg: Option<f64>,
+    /// Which axis of the given models is up; `None`: the usual one of each format.
+    pub up: Option<UpAxis>,
+    /// How files are read.
+    pub read: ReadOptions,
 }
 
-/// A mirror stands at the origin with this bounding-box diagonal.
+impl Request {
+    /// What turns a model, as it was read, upright.
+    fn turn(&self, path: &Path) -> DQuat {
+        let read_as = load::usual_up(path);
+        match (self.up.unwrap_or(read_as), read_as) {
+            (UpAxis::Z, UpAxis::Y) => load::Z_TO_Y,
+            (UpAxis::Y, UpAxis::Z) => load::Z_TO_Y.conjugate(),
+            _ => DQuat::IDENTITY,
+        }
+    }
+}
+
 /// As `--proxy`: this mirror has none.
 const NO_PROXY: &str = "none";
+/// A mirror stands at the origin with this bounding-box diagonal.
 const MIRROR_DIAGONAL: f64 = 2.0;
 /// Objects have this bounding-box diagonal, and the first stands here.
 const OBJECT_DIAGONAL: f64 = 1.2;
@@ -58,7 +75,7 @@ const MODEL_COLORS: [Vec3; 4] = [
 /// # Errors
 /// [`Error::Input`] names the input, file or option that is wrong; [`Error::Cancelled`].
 pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
-    let mut library = Library::new(cx);
+    let mut library = Library::new(request.read, cx);
     let mut scene = base(request, &mut library, cx)?;
     if !request.mirrors.is_empty() {
         scene.mirrors.clear();
@@ -68,17 +85,17 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
     }
     for input in &request.mirrors {
         let spot = (MIRROR_DIAGONAL, DVec3::ZERO);
-        let Placed { mesh, source, transform, name } =
-            placed("--mirror", input, spot, &mut library)?;
+        let Placed { found, transform, name } =
+            placed("--mirror", input, spot, request, &mut library)?;
         let name = new_name(&scene, &name);
-        scene.mirrors.push(Mirror { name, mesh, source, transform, tint: Vec3::ONE, proxy: None });
+        scene.mirrors.push(mirror(name, found.mirror()?, transform, Vec3::ONE));
     }
     for input in &request.objects {
         let spot = (OBJECT_DIAGONAL, BESIDE);
-        let Placed { mesh, source, transform, name } =
-            placed("--object", input, spot, &mut library)?;
-        let (name, paint) = (new_name(&scene, &name), plain_paint(&mesh));
-        scene.objects.push(Object { name, mesh, source, transform, paint, density: 1.0 });
+        let Placed { found, transform, name } =
+            placed("--object", input, spot, request, &mut library)?;
+        let (name, paint) = (new_name(&scene, &name), plain_paint(&found));
+        scene.objects.push(object(name, found, transform, paint));
     }
     let count = scene.mirrors.len();
     for (i, input) in request.proxies.iter().enumerate() {
@@ -90,18 +107,37 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
             continue;
         }
         mirror.proxy = Some(library.proxy(input, &mirror.mesh, |problem, remedy| {
-            Error::input("--proxy", "", problem, format!("{remedy}; files end in .obj or .ply"))
+            Error::input("--proxy", "", problem, format!("{remedy}; files end in {}", known()))
         })?);
     }
     override_eye(&mut scene.eye, request)?;
+    scene.notes.append(&mut library.notes);
     Ok(scene)
+}
+
+/// What models' files end in, for errors.
+fn known() -> String {
+    let names: Vec<String> = load::EXTENSIONS.iter().map(|e| format!(".{e}")).collect();
+    names.join(", ")
+}
+
+fn mirror(name: String, found: Found, transform: Similarity, tint: Vec3) -> Mirror {
+    let Found { mesh, source, .. } = found;
+    Mirror { name, mesh, source: Some(source), transform, tint, proxy: None }
+}
+
+fn object(name: String, found: Found, transform: Similarity, paint: Paint) -> Object {
+    let Found { mesh, points, source, .. } = found;
+    Object { name, mesh, points, source: Some(source), transform, paint, density: 1.0 }
 }
 
 /// The scene before `--mirror`, `--object` and the eye's options.
 fn base(request: &Request, library: &mut Library, cx: &Context) -> Result<Scene> {
-    let models = request.inputs.iter().filter(|i| load::is_mesh(Path::new(i))).count();
+    let models = request.inputs.iter().filter(|i| load::is_model(Path::new(i))).count();
     match &request.inputs[..] {
-        [] if request.mirrors.is_empty() && request.objects.is_empty() => named("default", cx),
+        [] if request.mirrors.is_empty() && request.objects.is_empty() => {
+            named("default", request, cx)
+        }
         [] => {
             let mut scene = bare("placed");
             if request.mirrors.is_empty() {
@@ -114,26 +150,27 @@ fn base(request: &Request, library: &mut Library, cx: &Context) -> Result<Scene>
                 let remedy = "give all models as inputs, or all with --object";
                 return Err(Error::input("--object", "", "would replace the given models", remedy));
             }
-            beside_teapot(inputs, library)
+            models::scene(request, library)
         }
-        [input] => named(input, cx),
+        [input] => named(input, request, cx),
         [first, ..] => {
-            let remedy = "give a single scene, or only models (.obj, .ply)";
+            let remedy = format!("give a single scene, or only models ({})", known());
             Err(Error::input(first, "", "is given together with other inputs", remedy))
         }
     }
 }
 
 /// A built-in scene or a scene file.
-fn named(input: &str, cx: &Context) -> Result<Scene> {
+fn named(input: &str, request: &Request, cx: &Context) -> Result<Scene> {
     let path = Path::new(input);
     if let Some(text) = builtin::scene_text(input) {
-        return file::parse(text, input, Path::new(""), cx);
+        return file::parse(text, input, Path::new(""), &request.read, cx);
     }
     if load::extension(path).as_deref() == Some("toml") {
-        return file::read(path, cx);
+        return file::read(path, &request.read, cx);
     }
-    let problem = "is neither a built-in scene nor a scene file (.toml) nor a model (.obj, .ply)";
+    let problem =
+        format!("is neither a built-in scene nor a scene file (.toml) nor a model ({})", known());
     let scenes = builtin::SCENES.join(", ");
     let remedy = if builtin::SHAPES.contains(&input) {
         format!("use the shape with --mirror or --object; the built-in scenes are {scenes}")
@@ -153,20 +190,21 @@ fn bare(name: &str) -> Scene {
         objects: Vec::new(),
         environment: DEFAULT_SKY,
         light: default_light(),
+        notes: Vec::new(),
     }
 }
 
 /// The mirror where none is asked for.
 fn teapot(library: &mut Library) -> Result<Mirror> {
-    let spot = (MIRROR_DIAGONAL, DVec3::ZERO);
-    let Placed { mesh, source, transform, name } = placed("--mirror", "teapot", spot, library)?;
-    Ok(Mirror { name, mesh, source, transform, tint: Vec3::ONE, proxy: None })
+    let found = library.shape("teapot", None, |p, r| Error::input("teapot", "", p, r))?;
+    let things = [(&*found.mesh, Similarity::IDENTITY)];
+    let transform = fit(&things, DQuat::IDENTITY, MIRROR_DIAGONAL, DVec3::ZERO);
+    Ok(mirror("teapot".into(), found, transform, Vec3::ONE))
 }
 
 /// What becomes a mirror or an object.
 struct Placed {
-    mesh: Arc<Mesh>,
-    source: Option<Source>,
+    found: Found,
     transform: Similarity,
     /// Plain: others may have it, too.
     name: String,
@@ -177,19 +215,22 @@ fn placed(
     option: &str,
     input: &str,
     (diagonal, base): (f64, DVec3),
+    request: &Request,
     library: &mut Library,
 ) -> Result<Placed> {
     let path = Path::new(input);
-    if !builtin::SHAPES.contains(&input) && (load::is_mesh(path) || path.exists()) {
-        let (mesh, source) = library.file(path)?;
-        let (transform, name) = (Similarity::IDENTITY, stem(path));
-        return Ok(Placed { mesh, source: Some(source), transform, name });
+    if !builtin::SHAPES.contains(&input) && (load::is_model(path) || path.exists()) {
+        let found = library.file(path, None)?;
+        let turn = Similarity { rotation: request.turn(path), ..Similarity::IDENTITY };
+        let (transform, name) = (found.own().then(&turn), stem(path));
+        return Ok(Placed { found, transform, name });
     }
-    let (mesh, source) = library.shape(input, None, |problem, remedy| {
-        Error::input(option, "", problem, format!("{remedy}; files end in .obj or .ply"))
+    let found = library.shape(input, None, |problem, remedy| {
+        Error::input(option, "", problem, format!("{remedy}; files end in {}", known()))
     })?;
-    let transform = fit(&mesh, DQuat::IDENTITY, diagonal, base);
-    Ok(Placed { mesh, source: Some(source), transform, name: input.to_owned() })
+    let things = [(&*found.mesh, Similarity::IDENTITY)];
+    let transform = fit(&things, DQuat::IDENTITY, diagonal, base);
+    Ok(Placed { found, transform, name: input.to_owned() })
 }
 
 /// A name that nothing in the scene has.
@@ -197,117 +238,6 @@ fn new_name(scene: &Scene, plain: &str) -> String {
     let mirrors = scene.mirrors.iter().map(|m| m.name.clone());
     let taken: Vec<String> = mirrors.chain(scene.objects.iter().map(|o| o.name.clone())).collect();
     unique(plain, &taken)
-}
-
-/// The teapot on a checkered ground, with models around it.
-fn beside_teapot(models: &[String], library: &mut Library) -> Result<Scene> {
-    let mut scene = bare(&stem(Path::new(&models[0])));
-    let mirror = teapot(library)?;
-    let mut discs = vec![Disc::around(&mirror.mesh, &mirror.transform)];
-    scene.mirrors.push(mirror);
-
-    for (i, model) in models.iter().enumerate() {
-        let path = Path::new(model);
-        let (mesh, source) = library.file(path)?;
-        let source = Some(source);
-        let mut transform = fit(&mesh, DQuat::IDENTITY, OBJECT_DIAGONAL, BESIDE);
-        let mut disc = Disc::around(&mesh, &transform);
-        if i > 0 {
-            disc.center = free_spot(disc.radius, &discs);
-            transform.translation += disc.center - BESIDE;
-        }
-        discs.push(disc);
-        let paint = match plain_paint(&mesh) {
-            Paint::Vertex => Paint::Vertex,
-            _ => Paint::Constant(MODEL_COLORS[i % MODEL_COLORS.len()]),
-        };
-        let name = new_name(&scene, &stem(path));
-        scene.objects.push(Object { name, mesh, source, transform, paint, density: 1.0 });
-    }
-    let things = scene.objects.iter().map(|o| (&o.mesh, &o.transform));
-    let boxes: Vec<_> = things.map(|(mesh, transform)| world_bounds(mesh, transform)).collect();
-    scene.eye = stepped_back(scene.eye, &boxes);
-
-    let far = discs.iter().map(|d| d.center.length() + d.radius).fold(0.0, f64::max);
-    let ground = ground(GROUND_SHARE * far, library)?;
-    scene.objects.push(Object { name: new_name(&scene, "ground"), ..ground });
-    Ok(scene)
-}
-
-/// The ground reaches so much farther than what stands on it.
-const GROUND_SHARE: f64 = 2.0;
-/// Length of two of its tiles, world units.
-const GROUND_PERIOD: f64 = 0.5;
-
-#[expect(clippy::cast_possible_truncation, reason = "a length in a pattern")]
-fn narrow(x: f64) -> f32 {
-    x as f32
-}
-
-/// The checkered ground, grown if it would end less than `radius` from the origin.
-fn ground(radius: f64, library: &mut Library) -> Result<Object> {
-    let (mesh, source) = library.shape("ground", None, |p, r| Error::input("ground", "", p, r))?;
-    let half = f64::from(mesh.bounds().extent().x.min(mesh.bounds().extent().z)) * 0.5;
-    let transform = Similarity { scale: (radius / half).max(1.0), ..Similarity::IDENTITY };
-    let colors = [Vec3::splat(0.72), Vec3::new(0.16, 0.17, 0.20)];
-    let period = narrow(GROUND_PERIOD / transform.scale);
-    let paint = Paint::Pattern { kind: PatternKind::Checker, colors, period };
-    let source = Some(source);
-    Ok(Object { name: String::new(), mesh, source, transform, paint, density: 1.0 })
-}
-
-/// What a thing stands on: y is 0.
-#[derive(Clone, Copy)]
-struct Disc {
-    center: DVec3,
-    radius: f64,
-}
-
-impl Disc {
-    fn around(mesh: &Mesh, transform: &Similarity) -> Self {
-        let (min, max) = world_bounds(mesh, transform);
-        let flat = DVec3::new(1.0, 0.0, 1.0);
-        Self { center: 0.5 * (min + max) * flat, radius: 0.5 * ((max - min) * flat).length() }
-    }
-}
-
-/// The first place around the teapot where a disc touches no other: on rings from the inside out, on each
-/// from the sides that the eye sees to the back, and not between eye and teapot.
-fn free_spot(radius: f64, discs: &[Disc]) -> DVec3 {
-    let to_eye = EYE.z.atan2(EYE.x);
-    // Rings 0.15 apart, 16 places on each; the quarter towards the eye stays free. Discs of bounded size
-    // leave room on some ring.
-    (4..)
-        .flat_map(|ring| (2..=14).map(move |step| (f64::from(ring) * 0.15, step)))
-        .map(|(ring, step)| {
-            // 2, 14, 3, 13, …: left and right in turn.
-            let turn = if step % 2 == 0 { 1 + step / 2 } else { 15 - step / 2 };
-            let angle = to_eye + TAU * f64::from(turn) / 16.0;
-            DVec3::new(ring * angle.cos(), 0.0, ring * angle.sin())
-        })
-        .find(|&p| discs.iter().all(|d| (d.center - p).length() >= d.radius + radius))
-        .unwrap_or(BESIDE)
-}
-
-/// Moves the eye back along its view until the boxes are in a picture of 4:3 or wider.
-fn stepped_back(eye: EyeDescription, boxes: &[(DVec3, DVec3)]) -> EyeDescription {
-    let forward = (eye.target - eye.position).normalize_or(DVec3::NEG_Z);
-    let right = forward.cross(eye.up).normalize_or(DVec3::X);
-    let up = right.cross(forward);
-    let tan_y = (0.5 * eye.fov_y).tan();
-    let tan_x = tan_y * 4.0 / 3.0;
-    let distance = |&(min, max): &(DVec3, DVec3)| {
-        let corner = |i: u32| {
-            let side = |bit: u32, min: f64, max: f64| if i >> bit & 1 == 0 { min } else { max };
-            let p = DVec3::new(side(0, min.x, max.x), side(1, min.y, max.y), side(2, min.z, max.z));
-            let p = p - eye.target;
-            (p.dot(right).abs() / tan_x).max(p.dot(up).abs() / tan_y) - p.dot(forward)
-        };
-        (0..8).map(corner).fold(0.0, f64::max)
-    };
-    let now = (eye.target - eye.position).length();
-    let needed = boxes.iter().map(distance).fold(now, f64::max);
-    EyeDescription { position: eye.target - forward * needed, ..eye }
 }
 
 /// Applies `--eye`, `--target` and `--fov`.

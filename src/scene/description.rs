@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
 
+use super::materials::Materials;
 use crate::geometry::lanes::Real;
-use crate::geometry::{Mesh, Similarity};
+use crate::geometry::{Mesh, Similarity, Surfels};
 
 /// A scene to be prepared. World space: right-handed, y up unless the eye says otherwise, f64.
 #[derive(Clone, Debug)]
@@ -23,6 +24,8 @@ pub struct Scene {
     pub environment: Environment,
     /// The sun and the ambient light.
     pub light: Light,
+    /// What whoever asked for the scene should know about its files: what was passed over, or guessed.
+    pub notes: Vec<String>,
 }
 
 /// The viewer's pinhole.
@@ -48,10 +51,17 @@ impl EyeDescription {
 }
 
 /// Where a mesh comes from: what a scene file has to say to get it again.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// A file of its own, by its absolute path.
-    File(PathBuf),
+    /// A file, by its absolute path.
+    File {
+        /// Where it is.
+        path: PathBuf,
+        /// Which of the things in it, by its name; `None` if it is all of them.
+        part: Option<String>,
+        /// Its own space to the file's: transforms of mirrors and objects contain it.
+        own: Similarity,
+    },
     /// A built-in shape, see [`builtin::shape`](super::builtin::shape).
     Shape {
         /// Its name.
@@ -59,6 +69,16 @@ pub enum Source {
         /// About how many triangles, if that was said.
         triangles: Option<usize>,
     },
+}
+
+impl Source {
+    /// The thing's own space to that of where it comes from.
+    pub fn own(&self) -> Similarity {
+        match self {
+            Self::File { own, .. } => *own,
+            Self::Shape { .. } => Similarity::IDENTITY,
+        }
+    }
 }
 
 /// A perfectly specular mesh with smooth normals.
@@ -96,6 +116,9 @@ pub struct Object {
     pub name: String,
     /// Local space.
     pub mesh: Arc<Mesh>,
+    /// The surfels of a thing that was given as points, local space: the mesh only stands for them where triangles are
+    /// needed (direct view, shadows, rays).
+    pub points: Option<Arc<Surfels>>,
     /// Where the mesh comes from; `None` if it was given in code.
     pub source: Option<Source>,
     /// Local to world.
@@ -107,7 +130,7 @@ pub struct Object {
 }
 
 /// Where the colour (linear RGB reflectance) of a surface point comes from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Paint {
     /// The mesh's vertex colours, interpolated.
     Vertex,
@@ -122,6 +145,8 @@ pub enum Paint {
         /// Length of a period in local units.
         period: f32,
     },
+    /// Each triangle's own, with textures.
+    Materials(Arc<Materials>),
 }
 
 /// Solid patterns: functions of the local position.
@@ -138,19 +163,28 @@ pub enum PatternKind {
 impl Paint {
     /// The colour at a point of a mesh.
     ///
-    /// `triangle` and `weights` say where it is (for vertex colours), `position` is the same point in local
-    /// space (for patterns). Meshes without vertex colours are white.
-    pub fn color(&self, mesh: &Mesh, triangle: usize, weights: [f32; 3], position: Vec3) -> Vec3 {
-        match *self {
-            Self::Vertex if mesh.colors().is_empty() => Vec3::ONE,
-            Self::Vertex => {
-                let corner = mesh.triangles()[triangle].map(|i| mesh.colors()[i as usize]);
-                corner[0] * weights[0] + corner[1] * weights[1] + corner[2] * weights[2]
-            }
-            Self::Constant(color) => color,
+    /// `triangle` and `weights` say where it is (for vertex colours and textures); patterns take the position from the
+    /// mesh. `radius`, local units, of the surroundings over which textures are averaged; 0 for the point alone. Meshes
+    /// without vertex colours are white.
+    pub fn color(&self, mesh: &Mesh, triangle: usize, weights: [f32; 3], radius: f32) -> Vec3 {
+        let of_vertices = |list: &[Vec3]| {
+            let corner = mesh.triangles()[triangle].map(|i| list[i as usize]);
+            corner[0] * weights[0] + corner[1] * weights[1] + corner[2] * weights[2]
+        };
+        let vertex =
+            || if mesh.colors().is_empty() { Vec3::ONE } else { of_vertices(mesh.colors()) };
+        match self {
+            Self::Vertex => vertex(),
+            Self::Constant(color) => *color,
             Self::Pattern { kind, colors, period } => {
-                let odd = kind.is_odd((position / period).to_array());
+                let position = of_vertices(mesh.positions());
+                let odd = kind.is_odd((position / *period).to_array());
                 colors[usize::from(odd)]
+            }
+            Self::Materials(materials) => {
+                let density = || materials.texels_per_length(triangle, mesh.corners(triangle));
+                let texels = if radius > 0.0 { radius * density() } else { 0.0 };
+                vertex() * materials.color(triangle, weights, texels)
             }
         }
     }

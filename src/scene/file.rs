@@ -18,7 +18,7 @@
 //! ground = [0.2, 0.18, 0.16]
 //! [[mirror]]                         # at least one
 //! name = "pot"                       # by default the shape or the file's name
-//! shape = "teapot"                   # or file = "pot.ply", relative to the scene file
+//! shape = "teapot"                   # or file = "pot.ply", relative to the scene file; and part = "lid", if not all of it
 //! triangles = 4000                   # of shapes only
 //! tint = [1, 1, 1]
 //! fit = { diagonal = 2, base = [0, 0, 0] }
@@ -36,17 +36,18 @@
 //! light grey. Instead of `scale` and `translate`, `fit` gives the diagonal of the bounding box after the
 //! rotation and where the middle of its bottom lies.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3, Vec3};
 use toml::Spanned;
 
+use super::builtin;
 use super::description::{
     Environment, EyeDescription, Light, Mirror, Object, Paint, PatternKind, Proxy, Scene,
 };
 use super::fit::fit;
 use super::library::{Found, Library, stem, unique};
-use super::load;
+use super::load::{self, Nearby, ReadOptions};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, Similarity};
@@ -85,13 +86,13 @@ pub(super) fn default_light() -> Light {
 ///
 /// # Errors
 /// As [`parse`], and if the file cannot be read.
-pub fn read(path: &Path, cx: &Context) -> Result<Scene> {
+pub fn read(path: &Path, options: &ReadOptions, cx: &Context) -> Result<Scene> {
     let bytes = load::bytes(path)?;
     let Ok(text) = str::from_utf8(&bytes) else {
         return Err(Error::file(path, "", "is not a text file in UTF-8", "give a scene file"));
     };
     let folder = path.parent().unwrap_or(Path::new(""));
-    parse(text, &path.display().to_string(), folder, cx)
+    parse(text, &path.display().to_string(), folder, options, cx)
 }
 
 /// Makes the scene that a text describes. `name` stands for the text in errors; files that it names are
@@ -99,7 +100,13 @@ pub fn read(path: &Path, cx: &Context) -> Result<Scene> {
 ///
 /// # Errors
 /// [`Error::Input`] with the line if the text is not a scene, or from a mesh file; [`Error::Cancelled`].
-pub fn parse(text: &str, name: &str, folder: &Path, cx: &Context) -> Result<Scene> {
+pub fn parse(
+    text: &str,
+    name: &str,
+    folder: &Path,
+    options: &ReadOptions,
+    cx: &Context,
+) -> Result<Scene> {
     let source = Text { text, name, folder };
     let table: SceneTable = toml::from_str(text).map_err(|e| {
         let message = e.message().trim().replace('\n', " ");
@@ -110,20 +117,20 @@ pub fn parse(text: &str, name: &str, folder: &Path, cx: &Context) -> Result<Scen
         return Err(Error::input(name, "", "has no mirror", remedy));
     }
 
-    let mut library = Library::new(cx);
+    let mut library = Library::new(*options, cx);
     let mut names = names(&source, &table)?.into_iter();
     let mut next_name = || names.next().unwrap_or_default();
     let mut mirrors = Vec::new();
     for spanned in &table.mirror {
         let at = spanned.span().start;
         let table = spanned.get_ref();
-        let (mesh, from) = source.mesh(at, Thing::from(table), &mut library)?;
+        let found = source.thing(at, Thing::from(table), &mut library)?.mirror()?;
         mirrors.push(Mirror {
             name: next_name(),
-            transform: source.transform(at, &Thing::from(table), &mesh)?,
-            proxy: source.proxy(at, table.proxy.as_deref(), &mesh, &mut library)?,
-            mesh,
-            source: Some(from),
+            transform: source.transform(at, &Thing::from(table), &found)?,
+            proxy: source.proxy(at, table.proxy.as_deref(), &found.mesh, &mut library)?,
+            mesh: found.mesh,
+            source: Some(found.source),
             tint: table.tint.map_or(Vec3::ONE, |c| c.0),
         });
     }
@@ -131,14 +138,15 @@ pub fn parse(text: &str, name: &str, folder: &Path, cx: &Context) -> Result<Scen
     for spanned in &table.object {
         let at = spanned.span().start;
         let table = spanned.get_ref();
-        let (mesh, from) = source.mesh(at, Thing::from(table), &mut library)?;
+        let found = source.thing(at, Thing::from(table), &mut library)?;
         objects.push(Object {
             name: next_name(),
-            transform: source.transform(at, &Thing::from(table), &mesh)?,
-            paint: source.paint(at, table, &mesh)?,
+            transform: source.transform(at, &Thing::from(table), &found)?,
+            paint: source.paint(at, table, &found)?,
             density: table.density.map_or(1.0, |d| d.0),
-            mesh,
-            source: Some(from),
+            mesh: found.mesh,
+            points: found.points,
+            source: Some(found.source),
         });
     }
     Ok(Scene {
@@ -148,12 +156,13 @@ pub fn parse(text: &str, name: &str, folder: &Path, cx: &Context) -> Result<Scen
         objects,
         environment: source.environment(table.environment.as_ref())?,
         light: light(table.light.unwrap_or_default()),
+        notes: library.notes,
     })
 }
 
-/// The paint of a mesh that comes with no other.
-pub(super) fn plain_paint(mesh: &Mesh) -> Paint {
-    if mesh.colors().is_empty() { Paint::Constant(LIGHT_GREY) } else { Paint::Vertex }
+/// The paint of what brings none.
+pub(super) fn plain_paint(found: &Found) -> Paint {
+    found.paint.clone().unwrap_or(Paint::Constant(LIGHT_GREY))
 }
 
 /// A name for each mirror, then for each object, all different.
@@ -201,6 +210,7 @@ struct Thing<'a> {
     name: Option<&'a Name>,
     shape: Option<&'a String>,
     file: Option<&'a String>,
+    part: Option<&'a String>,
     triangles: Option<Triangles>,
     rotate_deg: Option<&'a RotationTable>,
     scale: Option<Positive>,
@@ -216,6 +226,7 @@ macro_rules! thing_from {
                     name: table.name.as_ref(),
                     shape: table.shape.as_ref(),
                     file: table.file.as_ref(),
+                    part: table.part.as_ref(),
                     triangles: table.triangles,
                     rotate_deg: table.rotate_deg.as_ref(),
                     scale: table.scale,
@@ -240,9 +251,13 @@ struct Text<'a> {
 impl Text<'_> {
     /// An error at a byte of the text.
     fn error(&self, at: usize, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+        Error::input(self.name, format!("line {}", self.line(at)), problem, remedy)
+    }
+
+    /// The line of a byte of the text.
+    fn line(&self, at: usize) -> usize {
         let before = &self.text.as_bytes()[..at.min(self.text.len())];
-        let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
-        Error::input(self.name, format!("line {line}"), problem, remedy)
+        1 + before.iter().filter(|&&b| b == b'\n').count()
     }
 
     fn eye(&self, table: &Spanned<EyeTable>) -> Result<EyeDescription> {
@@ -289,8 +304,11 @@ impl Text<'_> {
         }
     }
 
-    fn mesh(&self, at: usize, thing: Thing, library: &mut Library) -> Result<Found> {
+    fn thing(&self, at: usize, thing: Thing, library: &mut Library) -> Result<Found> {
         match (thing.shape, thing.file) {
+            (Some(_), None) if thing.part.is_some() => {
+                Err(self.error(at, "a built-in shape has no parts", "remove the part"))
+            }
             (Some(shape), None) => {
                 library.shape(shape, thing.triangles.map(|t| t.0), |problem, remedy| {
                     self.error(at, problem, remedy)
@@ -300,16 +318,20 @@ impl Text<'_> {
                 Err(self.error(at, "triangles cannot be chosen for a file", "remove that key"))
             }
             (None, Some(file)) => {
-                let path = self.folder.join(file);
-                if !path.exists() {
-                    let problem = format!("{} does not exist", path.display());
-                    return Err(self.error(at, &problem, "check the name and the folder"));
-                }
-                library.file(&path)
+                library.file(&self.file(at, file, library)?, thing.part.map(String::as_str))
             }
             (Some(_), Some(_)) => Err(self.error(at, "has both shape and file", "remove one")),
             (None, None) => Err(self.error(at, "has neither shape nor file", "add one of them")),
         }
+    }
+
+    /// A file that the text names.
+    fn file(&self, at: usize, file: &str, library: &Library) -> Result<PathBuf> {
+        let nearby = Nearby { folder: self.folder, outside: library.options.outside };
+        nearby.find(file).map_err(|why| {
+            let path = self.folder.join(file).display().to_string();
+            why.error(self.name, &format!("line {}", self.line(at)), &path)
+        })
     }
 
     /// What stands for a mirror with this mesh.
@@ -321,12 +343,13 @@ impl Text<'_> {
         library: &mut Library,
     ) -> Result<Option<Proxy>> {
         let Some(input) = input else { return Ok(None) };
-        let path = self.folder.join(input);
-        let input = if path.exists() { path.to_str().unwrap_or(input) } else { input };
+        let is_file = !builtin::SHAPES.contains(&input) && load::is_model(Path::new(input));
+        let path = if is_file { Some(self.file(at, input, library)?) } else { None };
+        let input = path.as_ref().and_then(|path| path.to_str()).unwrap_or(input);
         library.proxy(input, mirror, |problem, remedy| self.error(at, problem, remedy)).map(Some)
     }
 
-    fn transform(&self, at: usize, thing: &Thing, mesh: &Mesh) -> Result<Similarity> {
+    fn transform(&self, at: usize, thing: &Thing, found: &Found) -> Result<Similarity> {
         let rotation = thing
             .rotate_deg
             .map_or(DQuat::IDENTITY, |r| DQuat::from_axis_angle(r.axis.0, r.angle.0.to_radians()));
@@ -335,17 +358,20 @@ impl Text<'_> {
                 let problem = "fit already says what scale and translate say";
                 Err(self.error(at, problem, "remove fit, or the other two"))
             }
-            Some(f) => Ok(fit(mesh, rotation, f.diagonal.0, f.base.0)),
-            None => Ok(Similarity {
+            Some(f) => {
+                let things = [(&*found.mesh, found.own())];
+                Ok(found.own().then(&fit(&things, rotation, f.diagonal.0, f.base.0)))
+            }
+            None => Ok(found.own().then(&Similarity {
                 rotation,
                 translation: thing.translate.map_or(DVec3::ZERO, |t| t.0),
                 scale: thing.scale.map_or(1.0, |s| s.0),
-            }),
+            })),
         }
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "the period is f32 by design")]
-    fn paint(&self, at: usize, table: &ObjectTable, mesh: &Mesh) -> Result<Paint> {
+    fn paint(&self, at: usize, table: &ObjectTable, found: &Found) -> Result<Paint> {
         match (&table.color, &table.pattern) {
             (Some(_), Some(_)) => Err(self.error(at, "has both color and pattern", "remove one")),
             (Some(color), None) => Ok(Paint::Constant(color.0)),
@@ -358,7 +384,7 @@ impl Text<'_> {
                 colors: pattern.colors.0.map(|c| c.0),
                 period: pattern.period.0 as f32,
             }),
-            (None, None) => Ok(plain_paint(mesh)),
+            (None, None) => Ok(plain_paint(found)),
         }
     }
 }

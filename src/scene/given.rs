@@ -62,6 +62,7 @@ impl PreparedScene {
             objects: vec![Object {
                 name: NAME.into(),
                 mesh: Arc::new(Mesh::none()),
+                points: None,
                 source: None,
                 transform: Similarity::IDENTITY,
                 paint: Paint::Constant(Vec3::ONE),
@@ -70,6 +71,7 @@ impl PreparedScene {
             environment,
             // Under it, shading changes nothing.
             light: Light { to_sun: Vec3::Y, sun: Vec3::ZERO, ambient: Vec3::ONE },
+            notes: Vec::new(),
         };
         let limits = KdTreeLimits::default();
         let cx = Context::default();

@@ -1,37 +1,111 @@
-//! Meshes by name or file, each made once and shared.
+//! Things by name or file, each made once and shared.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 
-use super::description::{Proxy, Source};
+use super::description::{Paint, Proxy, Source};
 use super::fit::{fit, world_bounds};
+use super::load::{Model, Part, ReadOptions};
 use super::{builtin, load};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::{Mesh, Similarity};
+use crate::geometry::{Mesh, Similarity, Surfels};
 
-/// Makes meshes and remembers them.
+/// Makes things and remembers them.
 pub(super) struct Library<'a> {
-    cx: &'a Context,
-    meshes: Vec<Found>,
+    pub(super) options: ReadOptions,
+    pub(super) cx: &'a Context,
+    /// What the files' readers had to say.
+    pub(super) notes: Vec<String>,
+    models: Vec<(PathBuf, Model)>,
+    known: Vec<Found>,
 }
 
-/// A mesh and where it comes from.
-pub(super) type Found = (Arc<Mesh>, Source);
+/// A mesh, or points and what stands for them; its colours, if it brings any; where it comes from, and so how its own space
+/// lies in the file's.
+#[derive(Clone, Debug)]
+pub(super) struct Found {
+    pub mesh: Arc<Mesh>,
+    pub points: Option<Arc<Surfels>>,
+    pub paint: Option<Paint>,
+    pub source: Source,
+}
 
-impl<'a> Library<'a> {
-    pub(super) fn new(cx: &'a Context) -> Self {
-        Self { cx, meshes: Vec::new() }
+impl Found {
+    /// Its own space to the file's.
+    pub(super) fn own(&self) -> Similarity {
+        self.source.own()
     }
 
-    /// The mesh in a file.
-    pub(super) fn file(&mut self, path: &Path) -> Result<Found> {
-        // If it cannot be resolved, reading it says why.
-        let resolved = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let cx = self.cx;
-        self.get(Source::File(resolved), || load::mesh(path, cx))
+    fn of(part: Part, path: PathBuf, name: Option<String>) -> Self {
+        let Part { mesh, points, paint, own, .. } = part;
+        Self { mesh, points, paint, source: Source::File { path, part: name, own } }
+    }
+
+    /// As a mirror.
+    ///
+    /// # Errors
+    /// It has no triangles.
+    pub(super) fn mirror(self) -> Result<Self> {
+        match (&self.points, &self.source) {
+            (Some(_), Source::File { path, .. }) => {
+                let problem = "is a cloud of points, and mirrors are made of triangles";
+                Err(Error::file(path, "", problem, "make it an object, or a mesh of it"))
+            }
+            _ => Ok(self),
+        }
+    }
+}
+
+impl<'a> Library<'a> {
+    pub(super) fn new(options: ReadOptions, cx: &'a Context) -> Self {
+        Self { options, cx, notes: Vec::new(), models: Vec::new(), known: Vec::new() }
+    }
+
+    /// All that is in a file, one by one: each with its name and what it reflects, if it is a mirror.
+    pub(super) fn model(&mut self, path: &Path) -> Result<Vec<(Part, Found)>> {
+        let (resolved, model) = self.read(path)?;
+        let single = model.parts.len() == 1;
+        let mut all = Vec::new();
+        for part in model.parts.clone() {
+            let name = (!single).then(|| part.name.clone());
+            let found = Found::of(part.clone(), resolved.clone(), name);
+            all.push((part, self.remember(found)));
+        }
+        Ok(all)
+    }
+
+    /// The camera in a file that was read.
+    pub(super) fn eye(&self, path: &Path) -> Option<super::description::EyeDescription> {
+        let resolved = resolved(path);
+        self.models.iter().find(|(known, _)| *known == resolved)?.1.eye
+    }
+
+    /// What is in a file as one thing, or one of its parts.
+    pub(super) fn file(&mut self, path: &Path, part: Option<&str>) -> Result<Found> {
+        let resolved = resolved(path);
+        let is_same = |f: &&Found| matches!(&f.source, Source::File { path, part: known, .. } if *path == resolved && known.as_deref() == part);
+        if let Some(found) = self.known.iter().find(is_same) {
+            return Ok(found.clone());
+        }
+        let (resolved, model) = self.read(path)?;
+        let Some(name) = part else {
+            let merged = model.clone().merged(path)?;
+            return Ok(self.remember(Found::of(merged, resolved, None)));
+        };
+        let wanted = model.parts.iter().find(|p| p.name == name).cloned();
+        let Some(wanted) = wanted else {
+            let names: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).collect();
+            let problem = format!("has no part \"{name}\"");
+            let remedy = match names[..] {
+                [_] => "it is all one: leave the part out".to_owned(),
+                _ => format!("its parts are {}", names.join(", ")),
+            };
+            return Err(Error::file(path, "", problem, remedy));
+        };
+        Ok(self.remember(Found::of(wanted, resolved, Some(name.to_owned()))))
     }
 
     /// A built-in shape with about so many triangles; `unknown` says where the name was given.
@@ -41,12 +115,15 @@ impl<'a> Library<'a> {
         triangles: Option<usize>,
         unknown: impl FnOnce(String, String) -> Error,
     ) -> Result<Found> {
-        self.get(Source::Shape { name: name.to_owned(), triangles }, || {
-            builtin::shape(name, triangles).ok_or_else(|| {
-                let problem = format!("there is no built-in shape \"{name}\"");
-                unknown(problem, format!("the shapes are {}", builtin::SHAPES.join(", ")))
-            })
-        })
+        let source = Source::Shape { name: name.to_owned(), triangles };
+        if let Some(found) = self.known.iter().find(|f| f.source == source) {
+            return Ok(found.clone());
+        }
+        let mesh = builtin::shape(name, triangles).ok_or_else(|| {
+            let problem = format!("there is no built-in shape \"{name}\"");
+            unknown(problem, format!("the shapes are {}", builtin::SHAPES.join(", ")))
+        })?;
+        Ok(self.remember(Found { mesh: Arc::new(mesh), points: None, paint: None, source }))
     }
 
     /// What stands for a mirror: a file in the mirror's own space, or a built-in shape, made as large as the mirror.
@@ -57,25 +134,44 @@ impl<'a> Library<'a> {
         unknown: impl FnOnce(String, String) -> Error,
     ) -> Result<Proxy> {
         let path = Path::new(input);
-        if !builtin::SHAPES.contains(&input) && (load::is_mesh(path) || path.exists()) {
-            let (mesh, source) = self.file(path)?;
-            return Ok(Proxy { mesh, source: Some(source), transform: Similarity::IDENTITY });
+        if !builtin::SHAPES.contains(&input) && (load::is_model(path) || path.exists()) {
+            let found = self.file(path, None)?.mirror()?;
+            let transform = found.own();
+            return Ok(Proxy { mesh: found.mesh, source: Some(found.source), transform });
         }
-        let (mesh, source) = self.shape(input, None, unknown)?;
+        let found = self.shape(input, None, unknown)?;
         let (min, max) = world_bounds(mirror, &Similarity::IDENTITY);
         let base = DVec3::new(0.5 * (min.x + max.x), min.y, 0.5 * (min.z + max.z));
-        let transform = fit(&mesh, DQuat::IDENTITY, (max - min).length(), base);
-        Ok(Proxy { mesh, source: Some(source), transform })
+        let things = [(&*found.mesh, Similarity::IDENTITY)];
+        let transform = fit(&things, DQuat::IDENTITY, (max - min).length(), base);
+        Ok(Proxy { mesh: found.mesh, source: Some(found.source), transform })
     }
 
-    fn get(&mut self, source: Source, make: impl FnOnce() -> Result<Mesh>) -> Result<Found> {
-        if let Some((mesh, _)) = self.meshes.iter().find(|(_, s)| *s == source) {
-            return Ok((Arc::clone(mesh), source));
-        }
-        let mesh = Arc::new(make()?);
-        self.meshes.push((Arc::clone(&mesh), source.clone()));
-        Ok((mesh, source))
+    /// The file's path, and its contents.
+    fn read(&mut self, path: &Path) -> Result<(PathBuf, &Model)> {
+        let resolved = resolved(path);
+        let known = self.models.iter().position(|(known, _)| *known == resolved);
+        let index = match known {
+            Some(index) => index,
+            None => {
+                let model = load::model(path, &self.options, self.cx)?;
+                self.notes.extend(model.notes.iter().cloned());
+                self.models.push((resolved.clone(), model));
+                self.models.len() - 1
+            }
+        };
+        Ok((resolved, &self.models[index].1))
     }
+
+    fn remember(&mut self, found: Found) -> Found {
+        self.known.push(found.clone());
+        found
+    }
+}
+
+/// If a path cannot be resolved, reading it says why.
+fn resolved(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 /// `stem`, or with the first number from 2 on that makes it none of `taken`.

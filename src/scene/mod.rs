@@ -13,6 +13,7 @@ pub mod given;
 mod library;
 #[cfg(feature = "cli")]
 pub mod load;
+pub mod materials;
 pub mod prepared;
 pub mod sample;
 pub mod shade;

@@ -167,9 +167,7 @@ impl Cloud {
 impl PreparedObject {
     /// Reflectance at a point of a triangle, linear RGB.
     pub fn albedo(&self, triangle: usize, weights: [f32; 3]) -> Vec3 {
-        let corner = self.mesh.triangles()[triangle];
-        let at = |k: usize| self.mesh.positions()[corner[k] as usize] * weights[k];
-        self.paint.color(&self.mesh, triangle, weights, at(0) + at(1) + at(2))
+        self.paint.color(&self.mesh, triangle, weights, 0.0)
     }
 
     /// Interpolated unit normal at a point of a triangle, scene space.
@@ -221,6 +219,18 @@ pub struct PreparedScene {
     pub tree_builds: usize,
 }
 
+/// Peak bytes a surfel (measured between 1 and 10 million: 126).
+const SURFEL_BYTES: u64 = 130;
+
+/// Whether there is room for a scene with so many surfels.
+///
+/// # Errors
+/// There is not: see [`Context::room_for`].
+pub fn check_room(surfels: usize, cx: &Context) -> Result<()> {
+    let bytes = SURFEL_BYTES.saturating_mul(surfels as u64);
+    cx.room_for("--surfels", &format!("{surfels} surfels"), bytes)
+}
+
 /// A number that no other scene of the program has had.
 fn another_version() -> u64 {
     static VERSIONS: AtomicU64 = AtomicU64::new(1);
@@ -234,6 +244,7 @@ impl PreparedScene {
     /// An option is out of its range, or cancelled.
     pub fn new(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Result<Self> {
         options.check()?;
+        check_room(options.surfels, cx)?;
         let start = Instant::now();
         let mut sampled = sample_objects(scene, options, cx)?;
         sampled.extend(sample_mirrors(scene, options.surfels, options.seed, cx)?);
@@ -265,7 +276,7 @@ impl PreparedScene {
             objects.push(PreparedObject {
                 name: object.name.clone(),
                 mesh: Arc::clone(&object.mesh),
-                paint: object.paint,
+                paint: object.paint.clone(),
                 to_scene: Similarity::IDENTITY,
                 positions: Vec::new(),
                 first_triangle,

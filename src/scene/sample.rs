@@ -99,7 +99,7 @@ fn surfels(
             let triangle = sample.triangle as usize;
             let [a, b, c] = mesh.triangles()[triangle].map(|i| mesh.normals()[i as usize]);
             let smooth = a * weights[0] + b * weights[1] + c * weights[2];
-            let color = paint.color(mesh, triangle, weights, sample.position);
+            let color = paint.color(mesh, triangle, weights, extent);
             (unit_normal(smooth, sample.normal), color)
         })
         .unzip_into_vecs(&mut normals, &mut albedo);

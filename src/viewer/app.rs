@@ -16,6 +16,7 @@ use super::worker::{
 };
 use super::{Opening, canvas, navigation, panels};
 use crate::camera::eye::ImageSize;
+use crate::context::MemoryLimit;
 use crate::frame::FrameReport;
 use crate::geometry::Similarity;
 use crate::scene::arrange::Request;
@@ -58,6 +59,7 @@ pub(super) struct Display {
 pub(super) struct Viewer {
     pub(super) worker: Worker,
     pub(super) settings: Settings,
+    memory: Option<MemoryLimit>,
     /// How scenes are prepared; what the sliders say, which is used from the next load on.
     pub(super) prepare: PrepareOptions,
     pub(super) mirror_triangles: Option<usize>,
@@ -113,9 +115,11 @@ impl Viewer {
             what: What::Request(opening.request.clone()),
             prepare: opening.prepare,
             mirror_triangles: None,
+            memory: opening.memory,
         });
         Self {
             worker,
+            memory: opening.memory,
             settings,
             prepare: opening.prepare,
             mirror_triangles: None,
@@ -234,7 +238,8 @@ impl Viewer {
         let inputs = files.iter().map(|f| f.to_string_lossy().into_owned()).collect();
         self.takes_eye = true;
         // What is open stays, and keeps its name, until the other is there.
-        let request = Request { inputs, ..Request::default() };
+        let (up, read) = (self.request.up, self.request.read);
+        let request = Request { inputs, up, read, ..Request::default() };
         self.opened = Some(request.clone());
         self.load(What::Request(request), None);
     }
@@ -252,7 +257,8 @@ impl Viewer {
         self.message = None;
         let prepare = self.prepare;
         self.loaded = (prepare, mirror_triangles);
-        self.worker.load(LoadRequest { what, prepare, mirror_triangles });
+        let memory = self.memory;
+        self.worker.load(LoadRequest { what, prepare, mirror_triangles, memory });
     }
 
     /// The scene as it is seen now.

@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 
 use super::app::Viewer;
+use crate::scene::description::{Scene, Source};
+use crate::scene::load::UpAxis;
 use crate::scene::prepared::PrepareOptions;
 
 /// The command line, and what else is to be done for it to draw the same.
@@ -28,11 +30,22 @@ pub(super) fn equivalent(viewer: &Viewer) -> (String, Option<&'static str>) {
                 word(&mut line, name);
             }
         }
+        if let Some(up) = request.up {
+            let _ = write!(line, " --up {}", if up == UpAxis::Z { "z" } else { "y" });
+        }
         let eye = viewer.eye;
         for (flag, p) in [("--eye", eye.position), ("--target", eye.target)] {
             let _ = write!(line, " {flag} {},{},{}", p.x, p.y, p.z);
         }
         let _ = write!(line, " --fov {}", eye.fov_y.to_degrees());
+    }
+    // A saved scene names files wherever they are.
+    let named = |s: &Option<Source>| matches!(s, Some(Source::File { .. }));
+    let sources = |s: &Scene| {
+        s.mirrors.iter().any(|m| named(&m.source)) || s.objects.iter().any(|o| named(&o.source))
+    };
+    if viewer.request.read.outside || (moved && viewer.scene.as_deref().is_some_and(sources)) {
+        line += " --allow-outside";
     }
     let _ = write!(line, " --size {}x{}", viewer.size.width, viewer.size.height);
     let standard = PrepareOptions::default();

@@ -28,6 +28,7 @@ pub use window::run;
 pub use worker::{BackendChoice, Prepared, Side};
 
 use crate::camera::eye::ImageSize;
+use crate::context::MemoryLimit;
 use crate::scene::arrange::Request;
 use crate::scene::prepared::PrepareOptions;
 
@@ -48,6 +49,8 @@ pub struct Opening {
     pub screenshot: Option<PathBuf>,
     /// When the program started.
     pub started: Instant,
+    /// How much memory loading may take.
+    pub memory: Option<MemoryLimit>,
 }
 
 impl Opening {

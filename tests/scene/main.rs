@@ -49,7 +49,7 @@ fn turned(axis: DVec3, degrees: f64, translation: DVec3) -> Similarity {
 }
 
 fn object(name: &str, mesh: Arc<Mesh>, transform: Similarity, paint: Paint) -> Object {
-    Object { name: name.into(), mesh, source: None, transform, paint, density: 1.0 }
+    Object { name: name.into(), mesh, source: None, points: None, transform, paint, density: 1.0 }
 }
 
 /// A scene under a plain sky, with one mirror without a tint.
@@ -73,6 +73,7 @@ fn scene(mirror: (Arc<Mesh>, Similarity), objects: Vec<Object>, eye: EyeDescript
             sun: Vec3::new(0.9, 0.85, 0.75),
             ambient: Vec3::new(0.33, 0.36, 0.42),
         },
+        notes: vec![],
     }
 }
 

@@ -32,12 +32,14 @@ fn described(mirror: &str, triangles: usize, eye: DVec3) -> Scene {
             name: "knot".into(),
             mesh: Arc::new(builtin::shape("knot", Some(2000)).unwrap()),
             source: None,
+            points: None,
             transform: at(DVec3::new(0.3, 0.5, 0.9), 0.3),
             paint: Paint::Constant(Vec3::splat(0.5)),
             density: 1.0,
         }],
         environment: Environment::Constant(Vec3::ONE),
         light: Light { to_sun: Vec3::Y, sun: Vec3::ONE, ambient: Vec3::ONE },
+        notes: vec![],
     }
 }
 

@@ -6,6 +6,7 @@ use glam::Vec3;
 use super::direct::{Appearance, Colors, CornerValues, Hit, LIT_VALUES, Spots, clamped};
 use crate::geometry::lanes::{Real, Vector, dot_const};
 use crate::scene::description::{Paint, PatternKind};
+use crate::scene::materials::Materials;
 use crate::scene::prepared::PreparedScene;
 use crate::scene::shade::{Sun, SurfacePoint, shade};
 use crate::visibility::{SAMPLES, SurfaceMesh};
@@ -100,6 +101,30 @@ fn odd_samples<S: Simd>(simd: S, kind: PatternKind, spots: &Spots, at: usize) ->
     odd
 }
 
+/// What materials show, averaged over a pixel. `weights`: in its middle, and a pixel to the right and below.
+#[inline(always)]
+fn textured<S: Simd>(
+    simd: S,
+    materials: &Materials,
+    spots: &Spots,
+    at: usize,
+    weights: [[f32x16<S>; 3]; 3],
+) -> [f32x16<S>; 3] {
+    let mut lanes = [[[0.0; 16]; 3]; 3];
+    for (place, weights) in lanes.iter_mut().zip(weights) {
+        place.iter_mut().zip(weights).for_each(|(to, weight)| weight.store(to));
+    }
+    let mut colors = [[0.0; 16]; 3];
+    for lane in 0..16.min(spots.len - at) {
+        let triangle = spots.triangle[at + lane] as usize;
+        let [here, right, below] = lanes.map(|weights| weights.map(|of_corner| of_corner[lane]));
+        let texels = materials.texels_across(triangle, here, [right, below]);
+        let color = materials.color(triangle, here, texels);
+        (0..3).for_each(|k| colors[k][lane] = color[k]);
+    }
+    colors.map(|color| f32x16::load(simd, &color))
+}
+
 impl Appearance for Look<'_> {
     #[inline(always)]
     fn albedo(&self, hit: &Hit) -> Vec3 {
@@ -132,9 +157,11 @@ impl Appearance for Look<'_> {
             let corner = corner as usize;
             let normal = object.mesh.normals()[corner];
             let place = axes.map(|axis| axis.dot(object.positions[corner]));
-            let paint = match object.paint {
-                Paint::Pattern { period, .. } => object.mesh.positions()[corner] / period,
-                Paint::Vertex => object.mesh.colors().get(corner).copied().unwrap_or(Vec3::ONE),
+            let paint = match &object.paint {
+                Paint::Pattern { period, .. } => object.mesh.positions()[corner] / *period,
+                Paint::Vertex | Paint::Materials(_) => {
+                    object.mesh.colors().get(corner).copied().unwrap_or(Vec3::ONE)
+                }
                 Paint::Constant(_) => Vec3::ZERO,
             };
             let mut values = [0.0; 9];
@@ -158,7 +185,7 @@ impl Appearance for Look<'_> {
         for at in (0..spots.len).step_by(16) {
             let sunlight = self.sunlight(simd, mesh, object, spots, at);
             let count = f32x16::load(simd, &spots.count[at..]);
-            match self.scene.objects[object].paint {
+            match &self.scene.objects[object].paint {
                 Paint::Constant(albedo) => {
                     for k in 0..3 {
                         let color = self.displayed(count.splat(albedo[k]), sunlight, k, white);
@@ -174,8 +201,17 @@ impl Appearance for Look<'_> {
                         (color * count).store(&mut out[k][at..]);
                     }
                 }
+                Paint::Materials(materials) => {
+                    let weights: [[f32x16<S>; 3]; 3] = spots.pixel_weights(simd, at);
+                    let vertex = spots.values(simd, at, weights[0], PAINT);
+                    let albedo = textured(simd, materials, spots, at, weights);
+                    for k in 0..3 {
+                        let color = self.displayed(albedo[k] * vertex[k], sunlight, k, white);
+                        (color * count).store(&mut out[k][at..]);
+                    }
+                }
                 Paint::Pattern { kind, colors, .. } => {
-                    let odd = odd_samples(simd, kind, spots, at);
+                    let odd = odd_samples(simd, *kind, spots, at);
                     for k in 0..3 {
                         let of = |i: usize| count.splat(colors[i][k]);
                         let one = self.displayed(of(0), sunlight, k, white);

@@ -45,6 +45,7 @@ use crate::camera::Eye;
 use crate::error::{Error, Result};
 use crate::image::{Picture, Planes};
 use crate::plan::{EnvironmentCube, Pass, Plan, Reflection, SplatPass, SplatShape};
+use crate::scene::description::Paint;
 use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::Visibility;
 /// What [`Gpu::on_device`] takes.
@@ -234,7 +235,10 @@ impl Backend for Gpu {
         picture: &mut Picture,
     ) {
         let composes = self.options.composes;
-        let ready = self.ready.as_mut().filter(|r| composes.unwrap_or(!r.gpu.software));
+        // The shaders know no textures yet.
+        let textured = scene.objects.iter().any(|o| matches!(o.paint, Paint::Materials(_)));
+        let composes = |r: &&mut Ready| composes.unwrap_or(!r.gpu.software) && !textured;
+        let ready = self.ready.as_mut().filter(composes);
         let done = ready.map(|r| r.compose(scene, eye, visibility, reflection, white, picture));
         if !matches!(done, Some(Ok(()))) {
             // Too large for the device, or that is gone: the reflection is here.

@@ -70,9 +70,11 @@ impl Surfaces {
                 t.map(|i| corner(object.positions[i as usize], rotated[i as usize]))
             });
             triangles.par_extend(rows);
-            let (paint, color, period, second) = match object.paint {
+            let (paint, color, period, second) = match &object.paint {
                 Paint::Vertex if object.mesh.colors().is_empty() => (0, Vec3::ONE, 0.0, Vec3::ONE),
-                Paint::Constant(color) => (0, color, 0.0, color),
+                // Never looked at: see `compose`.
+                Paint::Materials(_) => (0, Vec3::ONE, 0.0, Vec3::ONE),
+                Paint::Constant(color) => (0, *color, 0.0, *color),
                 Paint::Vertex => (1, Vec3::ONE, 0.0, Vec3::ONE),
                 Paint::Pattern { kind, colors, period } => {
                     let paint = match kind {
@@ -80,7 +82,7 @@ impl Surfaces {
                         PatternKind::Stripes => 3,
                         PatternKind::Rings => 4,
                     };
-                    (paint, colors[0], period, colors[1])
+                    (paint, colors[0], *period, colors[1])
                 }
             };
             let offset = u32::try_from(colors.len()).expect("as few as triangles");

@@ -119,7 +119,7 @@ pub(crate) fn run(args: &AnalyzeArgs, cx: &Context) -> anyhow::Result<()> {
 }
 
 fn find(args: &AnalyzeArgs, cx: &Context) -> anyhow::Result<Findings> {
-    args.scene.begin()?;
+    args.scene.begin(cx)?;
     let described = arrange::scene(&args.scene.place.request(), cx)?;
     let scene = PreparedScene::new(&described, &args.scene.prepare_options(None), cx)?;
     let eye = args.scene.place.eye(&scene)?;

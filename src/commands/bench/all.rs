@@ -38,7 +38,7 @@ impl std::fmt::Display for Kept {
 pub(super) fn run(args: &RunArgs, cx: &Context) -> anyhow::Result<()> {
     let folder = args.output.clone().unwrap_or_else(|| "catoptric-bench".into());
     check_folder(&folder)?;
-    begin(args)?;
+    begin(args, cx)?;
     let bench = Bench::new(args, cx);
     let (mut sections, mut from) = (Vec::new(), 0.0);
     for (name, share, section) in PARTS {

@@ -11,7 +11,7 @@ use catoptric::frame::Renderer;
 use catoptric::methods::{Method, Params, method};
 use catoptric::scene::arrange;
 use catoptric::scene::description::{Scene, Source};
-use catoptric::scene::prepared::{PrepareOptions, PreparedScene};
+use catoptric::scene::prepared::{self, PrepareOptions, PreparedScene};
 use catoptric::scene::{builtin, load};
 use catoptric::{Context, Error};
 use clap::Args;
@@ -84,7 +84,7 @@ impl<'a> Bench<'a> {
 
     /// For work that has bars of its own: it is cancelled likewise, and silent.
     pub(super) fn silent(self) -> Context {
-        Context::cancelled_by(self.cx.cancel_flag())
+        self.cx.silent()
     }
 
     pub(super) fn rounds(self) -> Rounds {
@@ -117,7 +117,7 @@ impl<'a> Bench<'a> {
         }
         let mut scene = arrange::scene(&request, &self.silent())?;
         if !request.inputs.is_empty()
-            && request.inputs.iter().all(|i| load::is_mesh(std::path::Path::new(i)))
+            && request.inputs.iter().all(|i| load::is_model(std::path::Path::new(i)))
         {
             scene.objects.pop();
         }
@@ -141,7 +141,8 @@ impl<'a> Bench<'a> {
 
     /// Whether so many surfels go into the free memory.
     pub(super) fn fits(self, surfels: usize) -> bool {
-        memory::check(surfels, self.args.place.size).is_ok()
+        prepared::check_room(surfels, self.cx).is_ok()
+            && memory::check(self.args.place.size, self.cx).is_ok()
     }
 
     /// Where c3rc is to run.
@@ -219,7 +220,7 @@ pub(super) fn single(
     bench: impl FnOnce(Bench<'_>) -> anyhow::Result<Section>,
 ) -> anyhow::Result<()> {
     let bench_of = Bench::new(args, cx);
-    begin(args)?;
+    begin(args, cx)?;
     let section = watched(|| bench(bench_of))?;
     let head = head(args, &format!("catoptric bench {}", section.id));
     let sections = [section];
@@ -235,7 +236,7 @@ pub(super) fn single(
 }
 
 /// Refuses what can be refused before anything is measured.
-pub(super) fn begin(args: &RunArgs) -> anyhow::Result<()> {
+pub(super) fn begin(args: &RunArgs, cx: &Context) -> anyhow::Result<()> {
     check_json(args.json.as_ref())?;
     if let Some(folder) = &args.output {
         check_folder(folder)?;
@@ -244,7 +245,7 @@ pub(super) fn begin(args: &RunArgs) -> anyhow::Result<()> {
         let problem = "is for --backend gpu";
         return Err(Error::input("--adapter", "", problem, "leave one of the two out").into());
     }
-    args.place.begin(1)
+    args.place.begin(1, cx)
 }
 
 /// Runs a bench, and notes in its section what else the machine did meanwhile.

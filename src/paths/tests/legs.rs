@@ -8,6 +8,7 @@ fn object(name: &str, translation: DVec3, scale: f64) -> Object {
         name: name.into(),
         mesh: Arc::new(builtin::shape(name, None).unwrap()),
         source: None,
+        points: None,
         transform: Similarity { translation, scale, ..Similarity::IDENTITY },
         paint: Paint::Constant(glam::Vec3::ONE),
         density: 1.0,

@@ -59,6 +59,7 @@ pub(super) fn scene(mirrors: &[(&str, usize, Similarity)]) -> Scene {
         objects: Vec::new(),
         environment: Environment::Constant(glam::Vec3::ONE),
         light,
+        notes: vec![],
     }
 }
 

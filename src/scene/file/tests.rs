@@ -6,7 +6,7 @@ const EYE: &str = "[eye]\nposition = [0, 1, 3]\ntarget = [0, 0.5, 0]\n";
 const MIRROR: &str = "[[mirror]]\nshape = \"sphere\"\n";
 
 fn scene(text: &str) -> Result<Scene> {
-    parse(text, "test.toml", Path::new(""), &Context::default())
+    parse(text, "test.toml", Path::new(""), &ReadOptions::default(), &Context::default())
 }
 
 fn complaint(text: &str) -> String {
@@ -126,7 +126,14 @@ fn the_example_of_the_documentation_is_right() {
     assert!(example.len() > 20);
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("bunny.ply"), TRIANGLE).unwrap();
-    let scene = parse(&example.join("\n"), "doc", folder.path(), &Context::default()).unwrap();
+    let scene = parse(
+        &example.join("\n"),
+        "doc",
+        folder.path(),
+        &ReadOptions::default(),
+        &Context::default(),
+    )
+    .unwrap();
     assert_eq!((scene.mirrors.len(), scene.objects.len()), (1, 1));
     assert_eq!(scene.objects[0].transform.scale, 0.5);
 }
@@ -147,7 +154,7 @@ fn files_are_relative_shared_and_named() {
     );
     let path = folder.path().join("my scene.toml");
     fs::write(&path, text).unwrap();
-    let scene = read(&path, &Context::default()).unwrap();
+    let scene = read(&path, &ReadOptions::default(), &Context::default()).unwrap();
     assert_eq!(scene.name, "my scene");
     let names: Vec<&str> = scene.mirrors.iter().map(|m| m.name.as_str()).collect();
     // The given name "tri" stays; the mirror that would have had it gives way.
@@ -163,6 +170,7 @@ fn files_are_relative_shared_and_named() {
         &format!("{EYE}[[mirror]]\nfile = \"none.ply\"\n"),
         "scene",
         folder.path(),
+        &ReadOptions::default(),
         &Context::default(),
     );
     let error = error.unwrap_err().to_string();
@@ -176,7 +184,8 @@ fn files_are_relative_shared_and_named() {
         if let Some(bytes) = bytes {
             fs::write(&path, bytes).unwrap();
         }
-        let error = read(&path, &Context::default()).unwrap_err().to_string();
+        let error =
+            read(&path, &ReadOptions::default(), &Context::default()).unwrap_err().to_string();
         assert!(error.contains(wanted) && error.contains(name), "{error}");
     }
 }
@@ -188,7 +197,7 @@ fn bad_scenes() {
         // Unknown keys name themselves, their line and what is allowed.
         (
             format!("{EYE}{MIRROR}colour = 1\n"),
-            "line 6: unknown field `colour`, expected one of `name`, `shape`, `file`, `triangles`, `tint`,",
+            "line 6: unknown field `colour`, expected one of `name`, `shape`, `file`, `part`, `triangles`, `tint`,",
         ),
         (
             format!("{EYE}postion = 1\n{MIRROR}"),

@@ -9,7 +9,7 @@ use serde::Serialize;
 use toml::ser::ValueSerializer;
 
 use super::grammar::SceneTable;
-use super::{DEFAULT_FOV_Y_DEG, DEFAULT_SKY, Text, default_light, names, plain_paint};
+use super::{DEFAULT_FOV_Y_DEG, DEFAULT_SKY, LIGHT_GREY, Text, default_light, names};
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, Similarity};
 use crate::image::io::write_bytes;
@@ -53,18 +53,18 @@ pub fn to_toml(scene: &Scene) -> Result<String> {
             out.entry("tint", &Color::new(*tint));
         }
         out.proxy(name, proxy.as_ref())?;
-        out.transform(transform);
+        out.transform(transform, source.as_ref());
     }
     for object in &scene.objects {
-        let Object { name, mesh, source, transform, paint, density } = object;
+        let Object { name, mesh, points: _, source, transform, paint, density } = object;
         out.table("[[object]]");
         out.entry("name", name);
         out.source(name, source.as_ref())?;
         if *density != 1.0 {
             out.entry("density", density);
         }
-        out.paint(paint, mesh);
-        out.transform(transform);
+        out.paint(paint, mesh, source.as_ref());
+        out.transform(transform, source.as_ref());
     }
     check(&out.0)?;
     Ok(out.0)
@@ -137,11 +137,14 @@ impl Lines {
                 let remedy = "save its mesh to a file, and make the scene with that";
                 return refused("its mesh comes from no file and is no built-in shape", remedy);
             }
-            Some(Source::File(path)) => {
+            Some(Source::File { path, part, own: _ }) => {
                 let Some(path) = path.to_str() else {
                     return refused("the path of its file is not Unicode", "rename the file");
                 };
                 self.entry("file", &path);
+                if let Some(part) = part {
+                    self.entry("part", part);
+                }
             }
             Some(Source::Shape { name, triangles }) => {
                 self.entry("shape", name);
@@ -160,7 +163,7 @@ impl Lines {
                 self.entry("proxy", name);
                 Ok(())
             }
-            Some(Some(Source::File(path))) if path.to_str().is_some() => {
+            Some(Some(Source::File { path, .. })) if path.to_str().is_some() => {
                 self.entry("proxy", &path.to_str());
                 Ok(())
             }
@@ -171,19 +174,19 @@ impl Lines {
         }
     }
 
-    fn paint(&mut self, paint: &Paint, mesh: &Mesh) {
+    fn paint(&mut self, paint: &Paint, mesh: &Mesh, source: Option<&Source>) {
         #[derive(Serialize)]
         struct Pattern {
             kind: &'static str,
             colors: [Color; 2],
             period: f64,
         }
-        if *paint == plain_paint(mesh) {
-            return;
-        }
         match *paint {
-            // A mesh without colours: one with them is plainly painted by them.
+            // They come with the mesh.
+            Paint::Materials(_) => {}
+            Paint::Vertex if !mesh.colors().is_empty() => {}
             Paint::Vertex => self.entry("color", &Color::new(Vec3::ONE)),
+            Paint::Constant(LIGHT_GREY) if matches!(source, Some(Source::Shape { .. })) => {}
             Paint::Constant(color) => self.entry("color", &Color::new(color)),
             Paint::Pattern { kind, colors, period } => {
                 let kind = match kind {
@@ -197,13 +200,17 @@ impl Lines {
         }
     }
 
-    fn transform(&mut self, transform: &Similarity) {
+    fn transform(&mut self, transform: &Similarity, source: Option<&Source>) {
         #[derive(Serialize)]
         struct Rotation {
             axis: [f64; 3],
             angle: f64,
         }
-        let Similarity { rotation, translation, scale } = *transform;
+        // Where its file puts it comes with the file.
+        let own = source.map_or(Similarity::IDENTITY, Source::own);
+        let rest =
+            if own == Similarity::IDENTITY { *transform } else { own.inverse().then(transform) };
+        let Similarity { rotation, translation, scale } = rest;
         if let Some((axis, angle)) = axis_angle(rotation) {
             self.entry("rotate_deg", &Rotation { axis: plain(axis), angle: degrees(angle) });
         }

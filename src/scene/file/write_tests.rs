@@ -6,14 +6,21 @@ use crate::scene::arrange::{self, Request};
 use crate::scene::builtin;
 use crate::scene::description::{EyeDescription, Light};
 use crate::scene::file::parse;
+use crate::scene::load::ReadOptions;
 
 /// Of transforms and directions.
 const CLOSE: f64 = 1e-12;
 
 fn read_back(scene: &Scene) -> Scene {
     let text = to_toml(scene).unwrap();
-    parse(&text, "written.toml", Path::new("elsewhere"), &Context::default())
-        .unwrap_or_else(|e| panic!("{e}\n{text}"))
+    parse(
+        &text,
+        "written.toml",
+        Path::new("elsewhere"),
+        &ReadOptions { outside: true },
+        &Context::default(),
+    )
+    .unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
 fn apart(a: &Similarity, b: &Similarity) -> f64 {
@@ -67,7 +74,8 @@ fn difference(a: &Scene, b: &Scene) -> Option<String> {
 fn built_in_scenes_come_back() {
     for name in builtin::SCENES {
         let text = builtin::scene_text(name).unwrap();
-        let scene = parse(text, name, Path::new(""), &Context::default()).unwrap();
+        let scene =
+            parse(text, name, Path::new(""), &ReadOptions::default(), &Context::default()).unwrap();
         assert_eq!(difference(&scene, &read_back(&scene)), None, "{name}");
     }
 }
@@ -111,7 +119,7 @@ fn all_kinds() -> Scene {
         shape = "cube"
         rotate_deg = { axis = [1, 0, 0], angle = 1e-7 }
     "##;
-    parse(text, "all.toml", Path::new(""), &Context::default()).unwrap()
+    parse(text, "all.toml", Path::new(""), &ReadOptions::default(), &Context::default()).unwrap()
 }
 
 #[test]
@@ -151,13 +159,18 @@ fn arranged_models_come_back() {
     };
     for request in [beside, placed] {
         let scene = arrange::scene(&request, &Context::default()).unwrap();
-        let file = Source::File(paths[1].canonicalize().unwrap());
+        let file = Source::File {
+            path: paths[1].canonicalize().unwrap(),
+            part: None,
+            own: Similarity::IDENTITY,
+        };
         assert!(scene.objects.iter().any(|o| o.source.as_ref() == Some(&file)));
         assert!(scene.objects.iter().any(|o| o.paint == Paint::Vertex));
         assert_eq!(difference(&scene, &read_back(&scene)), None);
         let saved = folder.path().join("saved.toml");
         write(&scene, &saved).unwrap();
-        let read = super::super::read(&saved, &Context::default()).unwrap();
+        let read = super::super::read(&saved, &ReadOptions { outside: true }, &Context::default())
+            .unwrap();
         assert_eq!(difference(&scene, &read), None);
     }
 }
@@ -166,7 +179,9 @@ fn arranged_models_come_back() {
 fn what_is_usual_is_left_out() {
     let text = "[eye]\nposition = [0, 1, 3]\ntarget = [0, 0.5, 0]\n[[mirror]]\nshape = \"sphere\"\n\
         rotate_deg = { axis = [0, 0, -1], angle = 30 }\n[[object]]\nshape = \"plane\"\ncolor = \"#d4213d\"\n";
-    let scene = parse(text, "a scene.toml", Path::new(""), &Context::default()).unwrap();
+    let scene =
+        parse(text, "a scene.toml", Path::new(""), &ReadOptions::default(), &Context::default())
+            .unwrap();
     let written = "name = \"a scene\"\n\n[eye]\nposition = [0.0, 1.0, 3.0]\ntarget = [0.0, 0.5, 0.0]\n\n\
         [[mirror]]\nname = \"sphere\"\nshape = \"sphere\"\n\
         rotate_deg = { axis = [0.0, 0.0, 1.0], angle = -30.0 }\n\n\
@@ -207,6 +222,6 @@ fn what_was_made_in_code_comes_back_as_it_looks() {
     scene.objects[1].paint = Paint::Constant(Vec3::ONE);
     assert_eq!(difference(&scene, &back), None);
     let mesh = &scene.objects[1].mesh;
-    let color = |paint: Paint| paint.color(mesh, 0, [1.0, 0.0, 0.0], Vec3::ONE);
-    assert_eq!(color(Paint::Vertex), color(back.objects[1].paint));
+    let color = |paint: &Paint| paint.color(mesh, 0, [1.0, 0.0, 0.0], 0.0);
+    assert_eq!(color(&Paint::Vertex), color(&back.objects[1].paint));
 }

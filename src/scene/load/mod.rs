@@ -1,21 +1,34 @@
-//! Meshes from files: one file a format.
+//! Models from files: one file a format.
 //!
-//! A reader is given the whole file as bytes and returns a checked [`Mesh`], or an error that names the file
+//! A reader is given the whole file as bytes and returns a checked [`Model`], or an error that names the file
 //! and the place in it. No reader allocates by a number that it finds in a file.
 
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::fs;
 use std::path::Path;
 
+use glam::DQuat;
+
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::{Mesh, MeshDefect};
+use crate::geometry::MeshDefect;
+pub(super) use crate::image::color::srgb_to_linear as linear_from_srgb;
 
+mod gltf;
+mod model;
+mod mtl;
+mod nearby;
 mod obj;
 mod ply;
 pub mod points;
+mod stl;
+mod textures;
 
-/// Extensions of the formats that [`mesh`] reads, in lower case.
-pub const EXTENSIONS: &[&str] = &["obj", "ply"];
+pub use model::{Model, Part};
+pub use nearby::{Nearby, Unfound};
+
+/// Extensions of the formats that [`model`] reads, in lower case.
+pub const EXTENSIONS: &[&str] = &["obj", "ply", "stl", "gltf", "glb"];
 
 /// The stage that is reported while a file is read.
 const STAGE: &str = "loading";
@@ -25,34 +38,78 @@ const REPORT_EVERY: usize = 1 << 16;
 const GET_IT_AGAIN: &str = "the file is damaged or cut off: get or export it again";
 const REPAIR: &str = "repair the file or export it again";
 
-/// Reads a mesh; the extension, in any case, tells the format.
+/// Bytes while a file is read, for each of its own: its contents, and what becomes of them (measured: a text of small
+/// numbers takes most).
+const READING: u64 = 4;
+
+/// How files are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// Files that a file names may lie outside of its folder.
+    pub outside: bool,
+}
+
+/// Reads a file with all that is in it; the extension, in any case, tells the format.
 ///
 /// Polygons become fans of triangles. Normals and colours are kept where every vertex has them.
 ///
 /// # Errors
-/// [`Error::Input`] if the file cannot be read or holds no proper mesh, [`Error::Cancelled`].
-pub fn mesh(path: &Path, cx: &Context) -> Result<Mesh> {
-    check_readable(path)?;
-    let mesh = match extension(path).as_deref() {
-        Some("obj") => obj::read(path, &bytes(path)?, cx)?,
-        Some("ply") => ply::read(path, &bytes(path)?, cx)?,
-        _ => {
-            let known = EXTENSIONS.join(" and .");
-            let problem = "is not of a kind that can be read";
-            return Err(Error::file(
-                path,
-                "",
-                problem,
-                format!("convert it: .{known} are supported"),
-            ));
-        }
-    };
+/// [`Error::Input`] if the file cannot be read, holds nothing to be shown or is too large, [`Error::Cancelled`].
+pub fn model(path: &Path, options: &ReadOptions, cx: &Context) -> Result<Model> {
+    let length = check_readable(path)?;
+    if !is_model(path) {
+        let (last, first) = EXTENSIONS.split_last().expect("there are some");
+        let problem = "is not of a kind that can be read";
+        let remedy = format!("convert it: .{} and .{last} are supported", first.join(", ."));
+        return Err(Error::file(path, "", problem, remedy));
+    }
+    let needed = length.saturating_mul(READING);
+    cx.room_for(&path.display().to_string(), "its contents", needed)?;
+    let model = model_of_bytes(path, &bytes(path)?, options, cx)?;
     cx.step(STAGE, 1.0)?;
-    Ok(mesh)
+    Ok(model)
+}
+
+/// The same for a file's contents. The name tells the format, and where the files lie that it names.
+///
+/// # Errors
+/// As [`model`].
+pub fn model_of_bytes(
+    path: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+    cx: &Context,
+) -> Result<Model> {
+    match extension(path).as_deref() {
+        Some("obj") => obj::read(path, bytes, options.outside, cx),
+        Some("stl") => stl::read(path, bytes, cx).map(Model::of_mesh),
+        Some("gltf" | "glb") => gltf::read(path, bytes, options.outside, cx),
+        _ => ply::read(path, bytes, cx).map(Model::of_mesh),
+    }
+}
+
+/// Which way is up in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UpAxis {
+    /// +y, as in the program's world.
+    Y,
+    /// +z, as in CAD, geodesy and Blender.
+    Z,
+}
+
+/// Turns +z to +y.
+pub const Z_TO_Y: DQuat = DQuat::from_xyzw(-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2);
+
+/// Which way a file of this kind is read to be up: +y, but for surveys.
+pub fn usual_up(path: &Path) -> UpAxis {
+    match extension(path).as_deref() {
+        Some("las" | "laz") => UpAxis::Z,
+        _ => UpAxis::Y,
+    }
 }
 
 /// Whether the extension is one of [`EXTENSIONS`].
-pub fn is_mesh(path: &Path) -> bool {
+pub fn is_model(path: &Path) -> bool {
     extension(path).is_some_and(|e| EXTENSIONS.contains(&e.as_str()))
 }
 
@@ -61,8 +118,8 @@ pub(super) fn extension(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
 }
 
-/// Refuses what is not a file with something in it.
-fn check_readable(path: &Path) -> Result<()> {
+/// The length of a file, bytes; refuses what is not a file with something in it.
+fn check_readable(path: &Path) -> Result<u64> {
     let data = fs::metadata(path).map_err(|e| unreadable(path, &e))?;
     if data.is_dir() {
         return Err(Error::file(path, "", "is a folder", "name a file in it"));
@@ -73,7 +130,7 @@ fn check_readable(path: &Path) -> Result<()> {
     if data.len() == 0 {
         return Err(Error::file(path, "", "is empty", GET_IT_AGAIN));
     }
-    Ok(())
+    Ok(data.len())
 }
 
 /// The bytes of a file that is not empty.
@@ -95,20 +152,18 @@ fn defect(path: &Path, defect: MeshDefect) -> Error {
     let place = match defect {
         MeshDefect::NotFinite { vertex } => format!("vertex {vertex}"),
         MeshDefect::IndexOutOfRange { triangle, .. } => format!("triangle {triangle}"),
-        MeshDefect::Empty | MeshDefect::Count { .. } | MeshDefect::ZeroArea => String::new(),
+        MeshDefect::Empty
+        | MeshDefect::Count { .. }
+        | MeshDefect::TooMany
+        | MeshDefect::ZeroArea => String::new(),
     };
     Error::file(path, place, defect.to_string(), REPAIR)
 }
 
 /// There are no faces, in the words of both formats.
 fn no_faces(path: &Path) -> Error {
-    let remedy = "give a triangle or polygon mesh: point clouds are not supported yet";
+    let remedy = "give a triangle or polygon mesh";
     Error::file(path, "", "has no faces", remedy)
-}
-
-/// Linear value of an sRGB one, both 0 to 1 (IEC 61966-2-1).
-pub(super) fn linear_from_srgb(value: f32) -> f32 {
-    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]

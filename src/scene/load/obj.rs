@@ -2,19 +2,26 @@
 //!
 //! `tobj` is handed only what a mesh is made of: vertices, normals and faces. Groups and texture coordinates
 //! would split vertices, and with them the averaged normals of a mirror; its errors name no line; and where
-//! only some vertices have colours it gives them to the wrong ones. So [`Source`] sits in between.
+//! only some vertices have colours it gives them to the wrong ones. So [`Source`] sits in between, and keeps materials and
+//! texture coordinates itself, a triangle at a time.
 
 use std::fmt::Write as _;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-use super::{GET_IT_AGAIN, REPAIR, REPORT_EVERY, STAGE, defect, linear_from_srgb, no_faces};
+use super::model::{Assembly, Model};
+use super::mtl::{self, Named};
+use super::nearby::Nearby;
+use super::textures::Textures;
+use super::{GET_IT_AGAIN, REPAIR, REPORT_EVERY, STAGE, defect, no_faces};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::Mesh;
 use crate::geometry::mesh::MAX_COORDINATE;
+use crate::image::color::srgb_to_linear;
+use crate::scene::file::LIGHT_GREY;
+use crate::scene::materials::Material;
 
 const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
     single_index: true,
@@ -23,8 +30,9 @@ const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
     ignore_lines: true,
 };
 
-/// Reads an OBJ file. Vertex colours are taken as sRGB from 0 to 1, as common modellers write them.
-pub(super) fn read(path: &Path, bytes: &[u8], cx: &Context) -> Result<Mesh> {
+/// Reads an OBJ file with its materials. Vertex colours are taken as sRGB from 0 to 1, as common modellers write them.
+/// What has a mirror's material becomes a mirror.
+pub(super) fn read(path: &Path, bytes: &[u8], outside: bool, cx: &Context) -> Result<Model> {
     let counts = Counts::of(bytes);
     if counts.faces == 0 {
         return Err(no_faces(path));
@@ -41,6 +49,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], cx: &Context) -> Result<Mesh> {
         tidy: String::new(),
         taken: 0,
         error: None,
+        paints: Paints::default(),
     };
     let loaded = tobj::load_obj_buf(&mut source, &OPTIONS, |_| Ok(Default::default()));
     if let Some(error) = source.error {
@@ -52,11 +61,140 @@ pub(super) fn read(path: &Path, bytes: &[u8], cx: &Context) -> Result<Mesh> {
     let vectors =
         |list: &[f32]| -> Vec<Vec3> { list.chunks_exact(3).map(Vec3::from_slice).collect() };
     let complete = mesh.normals.len() == mesh.positions.len();
-    let normals = if complete { vectors(&mesh.normals) } else { Vec::new() };
     let colors = vectors(&mesh.vertex_color);
-    let colors = colors.into_iter().map(|c| c.map(linear_from_srgb)).collect();
-    let triangles = mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-    Mesh::new(vectors(&mesh.positions), normals, colors, triangles).map_err(|d| defect(path, d))
+    let assembly = Assembly {
+        positions: vectors(&mesh.positions),
+        normals: if complete { vectors(&mesh.normals) } else { Vec::new() },
+        colors: colors.into_iter().map(|c| c.map(srgb_to_linear)).collect(),
+        triangles: mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        ..Assembly::default()
+    };
+    source.paints.paint(path, assembly, outside, cx)
+}
+
+/// What a file says of its faces' materials.
+#[derive(Default)]
+struct Paints {
+    /// Material files, each once.
+    libraries: Vec<String>,
+    /// Materials in the order in which they are first used.
+    names: Vec<String>,
+    /// One of `names` that the next faces have.
+    current: Option<u32>,
+    /// A triangle's name; `u32::MAX` is none.
+    of_triangle: Vec<u32>,
+    /// All `vt`.
+    coordinates: Vec<Vec2>,
+    /// Indices of a triangle's; empty if no material is named.
+    corners: Vec<[u32; 3]>,
+}
+
+impl Paints {
+    fn use_material(&mut self, name: &str) {
+        let known = self.names.iter().position(|known| known == name).unwrap_or_else(|| {
+            self.names.push(name.to_owned());
+            self.names.len() - 1
+        });
+        self.current = u32::try_from(known).ok();
+    }
+
+    /// Notes the triangles of a face, in `tobj`'s order: a fan about its first corner.
+    fn face(&mut self, coordinates: &[u32]) {
+        if self.libraries.is_empty() && self.current.is_none() {
+            return;
+        }
+        for k in 2..coordinates.len() {
+            self.of_triangle.push(self.current.unwrap_or(u32::MAX));
+            self.corners.push([coordinates[0], coordinates[k - 1], coordinates[k]]);
+        }
+    }
+
+    /// Gives the mesh its materials, and divides it into what is diffuse and each mirror.
+    fn paint(&self, path: &Path, mut mesh: Assembly, outside: bool, cx: &Context) -> Result<Model> {
+        let mut textures = Textures::default();
+        let named = self.named(path, outside, &mut textures, cx)?;
+        // Faces before the first material have none; the list begins where `face` began to note.
+        let first = mesh.triangles.len() - self.of_triangle.len();
+        let material = |t: usize| {
+            let name = *t.checked_sub(first).and_then(|t| self.of_triangle.get(t))?;
+            let name = self.names.get(name as usize)?;
+            named.iter().position(|n| n.name == *name)
+        };
+        let model = |parts, notes| Model { parts, eye: None, notes };
+        if named.is_empty() || (0..mesh.triangles.len()).all(|t| material(t).is_none()) {
+            let part = mesh.part(String::new(), None).map_err(|d| defect(path, d))?;
+            return Ok(model(vec![part], textures.notes));
+        }
+        let plain = if mesh.colors.is_empty() { LIGHT_GREY } else { Vec3::ONE };
+        mesh.materials = named.iter().map(|n| n.material.clone()).collect();
+        mesh.materials.push(Material { color: plain, texture: None });
+        let textured = named.iter().any(|n| n.material.texture.is_some());
+        for t in 0..mesh.triangles.len() {
+            let found = material(t);
+            let index = found.unwrap_or(named.len());
+            mesh.of_triangle.push(u32::try_from(index).unwrap_or(0));
+            if textured {
+                let corners = t.checked_sub(first).map_or([u32::MAX; 3], |t| self.corners[t]);
+                mesh.uv.push(corners.map(|i| match (found, self.coordinates.get(i as usize)) {
+                    (Some(m), Some(uv)) => {
+                        let uv = *uv * named[m].scale + named[m].offset;
+                        // Upwards in the file.
+                        Vec2::new(uv.x, 1.0 - uv.y)
+                    }
+                    _ => Vec2::ZERO,
+                }));
+            }
+        }
+        let mirrors: Vec<usize> = (0..named.len()).filter(|&m| named[m].mirror.is_some()).collect();
+        let of = |t: usize| mesh.of_triangle[t] as usize;
+        let groups = std::iter::once(None).chain(mirrors.iter().map(|&m| Some(m)));
+        let mut parts = Vec::new();
+        for group in groups {
+            let belongs = |t: usize| match group {
+                Some(m) => of(t) == m,
+                None => !mirrors.contains(&of(t)),
+            };
+            let piece = mesh.subset(belongs);
+            if piece.triangles.is_empty() {
+                continue;
+            }
+            let (name, mirror) =
+                group.map_or(("diffuse", None), |m| (named[m].name.as_str(), named[m].mirror));
+            let piece = if mirror.is_some() {
+                Assembly { of_triangle: vec![], uv: vec![], materials: vec![], ..piece }
+            } else {
+                piece
+            };
+            parts.push(piece.part(name.to_owned(), mirror).map_err(|d| defect(path, d))?);
+        }
+        Ok(model(parts, textures.notes))
+    }
+
+    /// The materials that faces use, as far as they are found.
+    fn named(
+        &self,
+        path: &Path,
+        outside: bool,
+        textures: &mut Textures,
+        cx: &Context,
+    ) -> Result<Vec<Named>> {
+        let nearby = Nearby::of(path, outside);
+        let mut named: Vec<Named> = Vec::new();
+        for library in &self.libraries {
+            match nearby.find_loosely(library) {
+                Ok(file) => {
+                    let bytes = super::bytes(&file)?;
+                    named.extend(mtl::read(&file, &bytes, outside, textures, cx)?);
+                }
+                Err(why) => {
+                    let error = why.error(&path.display().to_string(), "", library);
+                    textures.notes.push(format!("{error}: shown without its materials"));
+                }
+            }
+        }
+        named.retain(|n| self.names.contains(&n.name));
+        Ok(named)
+    }
 }
 
 /// What the file holds, counted before it is parsed.
@@ -64,6 +202,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], cx: &Context) -> Result<Mesh> {
 struct Counts {
     vertices: i64,
     normals: i64,
+    coordinates: i64,
     faces: i64,
     /// Vertices with a colour.
     colored: i64,
@@ -80,6 +219,7 @@ impl Counts {
                     counts.colored += i64::from(words.count() == 7);
                 }
                 b"vn" => counts.normals += 1,
+                b"vt" => counts.coordinates += 1,
                 b"f" => counts.faces += 1,
                 _ => {}
             }
@@ -117,6 +257,7 @@ struct Source<'a> {
     taken: usize,
     /// Why reading stopped; `tobj` would swallow it.
     error: Option<Error>,
+    paints: Paints,
 }
 
 impl Source<'_> {
@@ -133,7 +274,8 @@ impl Source<'_> {
             let (line, rest) = self.rest.split_at(end);
             self.rest = rest;
             self.line += 1;
-            if matches!(keyword(line), b"v" | b"vn" | b"f") {
+            let key = keyword(line);
+            if matches!(key, b"v" | b"vn" | b"vt" | b"f") {
                 let checked = match str::from_utf8(code(line)) {
                     Ok(text) => self.tidy_up(text),
                     Err(_) => Err(("is not text".into(), GET_IT_AGAIN)),
@@ -141,7 +283,18 @@ impl Source<'_> {
                 checked.map_err(|(problem, remedy)| {
                     Error::file(self.path, format!("line {}", self.line), problem, remedy)
                 })?;
-                self.tidy.push('\n');
+                if !self.tidy.is_empty() {
+                    self.tidy.push('\n');
+                }
+            } else if matches!(key, b"usemtl" | b"mtllib") {
+                // A name may be in any encoding, and have spaces.
+                let text = String::from_utf8_lossy(line);
+                let name = text.trim_start()[key.len()..].trim();
+                match key {
+                    b"usemtl" => self.paints.use_material(name),
+                    _ if self.paints.libraries.iter().any(|known| known == name) => {}
+                    _ => self.paints.libraries.push(name.to_owned()),
+                }
             }
         }
         Ok(())
@@ -152,13 +305,21 @@ impl Source<'_> {
         let mut words = line.split_ascii_whitespace();
         let key = words.next().unwrap_or_default();
         let count = words.clone().count();
+        if key == "vt" {
+            let mut number = || words.next().and_then(|word| word.parse::<f32>().ok());
+            let place = Vec2::new(number().unwrap_or(0.0), number().unwrap_or(0.0));
+            self.paints.coordinates.push(place);
+            return Ok(());
+        }
         self.tidy.push_str(key);
         if key == "f" {
             if count < 3 {
                 let problem = format!("has a face of {count} vertices, which needs at least 3");
                 return Err((problem, GET_IT_AGAIN));
             }
-            return words.try_for_each(|word| self.corner(word)).map_err(|p| (p, REPAIR));
+            let corners: Result<Vec<u32>, String> = words.map(|word| self.corner(word)).collect();
+            self.paints.face(&corners.map_err(|p| (p, REPAIR))?);
+            return Ok(());
         }
         // A vertex may have a weight or a colour; colours are of use if all have them.
         let all_colored = self.counts.colored == self.counts.vertices;
@@ -186,17 +347,23 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// Checks a corner of a face ("v", "v/vt", "v//vn", "v/vt/vn") and appends it without vt.
-    fn corner(&mut self, word: &str) -> Result<(), String> {
+    /// Checks a corner of a face ("v", "v/vt", "v//vn", "v/vt/vn") and appends it without vt, whose index it returns;
+    /// `u32::MAX` is none.
+    fn corner(&mut self, word: &str) -> Result<u32, String> {
         let mut parts = word.split('/');
         let vertex = parts.next().unwrap_or_default();
-        let normal = parts.nth(1).unwrap_or_default();
+        let coordinate = parts.next().unwrap_or_default();
+        let normal = parts.next().unwrap_or_default();
         let c = self.counts;
+        let coordinates = i64::try_from(self.paints.coordinates.len()).unwrap_or(i64::MAX);
+        let mut at = 0;
         for (index, what, so_far, total) in [
             (vertex, "vertex", self.vertices, c.vertices),
             (normal, "normal", self.normals, c.normals),
+            (coordinate, "texture coordinate", coordinates, c.coordinates),
         ] {
-            if what == "normal" && index.is_empty() {
+            at = 0;
+            if what != "vertex" && index.is_empty() {
                 continue;
             }
             let number: i64 =
@@ -206,10 +373,12 @@ impl Source<'_> {
             if !(1..=total).contains(&absolute) {
                 return Err(format!("names {what} {number}, but there are {total}"));
             }
+            at = absolute;
         }
         let slashes = if normal.is_empty() { "" } else { "//" };
         let _ = write!(self.tidy, " {vertex}{slashes}{normal}");
-        Ok(())
+        // From 1 in the file.
+        Ok(u32::try_from(at - 1).unwrap_or(u32::MAX))
     }
 }
 

@@ -3,15 +3,23 @@ use std::sync::atomic::Ordering;
 use glam::Vec3;
 
 use super::*;
+use crate::geometry::Mesh;
 
 mod obj;
 mod ply;
+mod stl;
 
 fn load(name: &str, bytes: &[u8]) -> Result<Mesh> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     fs::write(&path, bytes).unwrap();
     mesh(&path, &Context::default())
+}
+
+/// All of a file as one mesh.
+fn mesh(path: &Path, cx: &Context) -> Result<Mesh> {
+    let part = model(path, &ReadOptions::default(), cx)?.merged(path)?;
+    Ok((*part.mesh).clone())
 }
 
 /// The error's place and problem, which must come with the file's name and a remedy.
@@ -74,14 +82,14 @@ fn files_that_are_no_mesh() {
     assert!(fail("none.ply").contains("does not exist"));
     fs::create_dir(folder.path().join("folder.ply")).unwrap();
     assert!(fail("folder.ply").contains("is a folder"));
-    for name in ["a.obj", "a.ply"] {
+    for name in ["a.obj", "a.ply", "a.stl", "a.gltf", "a.glb"] {
         assert_eq!(complaint(name, b""), "is empty");
     }
-    for name in ["a.stl", "ply", "a.ply.gz"] {
+    for name in ["a.3ds", "ply", "a.ply.gz"] {
         assert!(complaint(name, b"solid").contains("kind"), "{name}");
     }
-    let unknown = load("a.stl", b"solid").unwrap_err().to_string();
-    assert!(unknown.contains(".obj and .ply"), "{unknown}");
+    let unknown = load("a.3ds", b"solid").unwrap_err().to_string();
+    assert!(unknown.contains(".obj, .ply, .stl, .gltf and .glb"), "{unknown}");
 }
 
 #[test]

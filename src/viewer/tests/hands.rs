@@ -130,7 +130,14 @@ fn a_moved_mirror_is_drawn_as_if_it_had_always_been_there() {
     // What is saved as a scene is the same picture, drawn by the library.
     let scene = viewer(&hands).as_placed().expect("a scene");
     let text = file::to_toml(&scene).expect("all meshes have names");
-    let read = file::parse(&text, "saved", folder.path(), &Context::default()).expect("it reads");
+    let read = file::parse(
+        &text,
+        "saved",
+        folder.path(),
+        &crate::scene::load::ReadOptions::default(),
+        &Context::default(),
+    )
+    .expect("it reads");
     let seen = crate::image::io::read_picture(&picture).expect("a picture");
     let drawn = drawn(&read, &hands, seen.width, seen.height);
     // Of eight bits, too.

@@ -56,6 +56,7 @@ fn opening(input: &str) -> Opening {
         frames: None,
         screenshot: None,
         started: Instant::now(),
+        memory: None,
     }
 }
 

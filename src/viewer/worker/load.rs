@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::{Arrived, Event, Prepared, Shared};
-use crate::context::{Context, Progress};
+use crate::context::{Context, MemoryLimit, Progress};
 use crate::error::{Error, Result};
 use crate::geometry::{Aabb, Similarity};
 use crate::methods::{METHODS, Method, Params};
@@ -39,6 +39,7 @@ pub(crate) struct LoadRequest {
     pub(crate) prepare: PrepareOptions,
     /// Triangles of mirrors that are built-in shapes, if not as the scene says.
     pub(crate) mirror_triangles: Option<usize>,
+    pub(crate) memory: Option<MemoryLimit>,
 }
 
 /// Starts; the flag cancels it.
@@ -47,7 +48,8 @@ pub(super) fn start(request: LoadRequest, generation: u64, shared: Arc<Shared>) 
         shared: Arc::clone(&shared),
         generation,
         last: Mutex::new(Instant::now() - PAUSE),
-    }));
+    }))
+    .with_memory(request.memory);
     let flag = cx.cancel_flag();
     let run = move || {
         let done = load(&request, generation, &shared, &cx);

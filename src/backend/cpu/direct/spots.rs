@@ -162,6 +162,21 @@ impl Spots {
     /// The weights of the corners in the middle of the samples, in the lanes from `at` on.
     #[inline(always)]
     pub fn own_weights<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [V; 3] {
+        let place = self.own_place(simd, at);
+        self.weights(simd, at, &self.shares, place)
+    }
+
+    /// The same, and those a pixel to the right and a pixel below: how far the pixel reaches.
+    #[inline(always)]
+    pub fn pixel_weights<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [[V; 3]; 3] {
+        let [x, y] = self.own_place(simd, at);
+        [[x, y], [x + 1.0, y], [x, y + 1.0]]
+            .map(|place| self.weights(simd, at, &self.shares, place))
+    }
+
+    /// The middle of the samples, from the pixel's.
+    #[inline(always)]
+    fn own_place<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [V; 2] {
         let (mut x, mut y) = (V::broadcast(simd, 0.0), V::broadcast(simd, 0.0));
         for (sample, lanes) in self.samples.iter().enumerate() {
             let covered = V::load(simd, &lanes[at..]);
@@ -169,7 +184,7 @@ impl Spots {
             (x, y) = (x + covered * dx, y + covered * dy);
         }
         let count = V::load(simd, &self.count[at..]).max(V::broadcast(simd, 1.0));
-        self.weights(simd, at, &self.shares, [x / count, y / count])
+        [x / count, y / count]
     }
 
     /// The weights of the corners at one of the samples of a pixel, in the lanes from `at` on.

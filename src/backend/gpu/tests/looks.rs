@@ -45,6 +45,7 @@ fn scene(environment: Environment) -> PreparedScene {
         name: name.into(),
         mesh,
         source: None,
+        points: None,
         transform,
         paint,
         density: 1.0,
@@ -115,6 +116,7 @@ fn scene(environment: Environment) -> PreparedScene {
             sun: Vec3::new(0.9, 0.85, 0.75),
             ambient: Vec3::new(0.33, 0.36, 0.42),
         },
+        notes: vec![],
     };
     let options = PrepareOptions { surfels: 20_000, ..PrepareOptions::default() };
     PreparedScene::new(&scene, &options, &Context::default()).expect("it is a scene")

@@ -36,6 +36,7 @@ pub(super) fn scene(shape: &str) -> PreparedScene {
         name: name.into(),
         mesh: mesh(name, 2000),
         source: None,
+        points: None,
         transform,
         paint: Paint::Constant(color),
         density: 1.0,
@@ -75,6 +76,7 @@ pub(super) fn scene(shape: &str) -> PreparedScene {
             sun: Vec3::splat(0.8),
             ambient: Vec3::splat(0.3),
         },
+        notes: vec![],
     };
     let options = PrepareOptions { surfels: 20_000, ..PrepareOptions::default() };
     PreparedScene::new(&scene, &options, &Context::default()).expect("it is a scene")

@@ -87,8 +87,6 @@ fn bad_obj() {
     }
     assert_eq!(complaint("a.obj", b"v 0 0 \xff\nf 1 1 1\n"), "line 1: is not text");
     assert_eq!(complaint("a.obj", &[0; 4096]), "has no faces");
-    let points = load("a.obj", b"v 0 0 0\n").unwrap_err().to_string();
-    assert!(points.contains("point clouds are not supported yet"));
 }
 
 #[test]
@@ -100,7 +98,77 @@ fn any_byte_may_be_wrong() {
         for byte in [0, b'-', b'9', b'/', b'\n', 0xff] {
             let mut bad = good.clone();
             bad[at] = byte;
-            let _ = obj::read(path, &bad, &cx);
+            let _ = obj::read(path, &bad, false, &cx);
         }
+    }
+}
+
+/// A red square on the left, a textured one on the right, a mirror behind; a quad each.
+const PAINTED: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\n\
+    v 0 0 -1\nv 2 0 -1\nv 2 1 -1\nv 0 1 -1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+    usemtl red\nf 1 2 3 4\nusemtl wood\nf 2/1 5/2 6/3 3/4\nusemtl glass\nf 7 8 9 10\n";
+const MATERIALS: &str = "newmtl red\nKd 1 0 0\nillum 2\nnewmtl wood\nKd 0 0 0\nmap_Kd textures\\w.png\n\
+    newmtl glass\nKs 0.5 1 1\nillum 3\nnewmtl other\nKd 1\n";
+
+/// The model in a folder with its materials and a texture: white above, black below.
+fn painted(materials: &str) -> Model {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    fs::create_dir(place("textures")).unwrap();
+    let texture =
+        image::RgbImage::from_fn(2, 2, |_, y| image::Rgb([if y == 0 { 255 } else { 0 }; 3]));
+    texture.save(place("textures/w.png")).unwrap();
+    fs::write(place("a.mtl"), materials).unwrap();
+    fs::write(place("a.obj"), PAINTED).unwrap();
+    model(&place("a.obj"), &ReadOptions::default(), &Context::default()).unwrap()
+}
+
+#[test]
+fn materials_paint_triangles_and_make_mirrors() {
+    let model = painted(MATERIALS);
+    assert_eq!(model.notes, Vec::<String>::new());
+    let names: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["diffuse", "glass"]);
+    let (diffuse, glass) = (&model.parts[0], &model.parts[1]);
+    let tint = glass.mirror.unwrap();
+    assert!((tint - Vec3::new(0.214, 1.0, 1.0)).length() < 1e-3, "{tint}");
+    assert_eq!(glass.mesh.triangles().len(), 2);
+    assert_eq!(glass.mesh.positions().len(), 4, "only its own vertices");
+    let paint = diffuse.paint.clone().unwrap();
+    let color = |t: usize, w: [f32; 3]| paint.color(&diffuse.mesh, t, w, 0.0);
+    assert_eq!(color(0, [1.0, 0.0, 0.0]), Vec3::X);
+    assert_eq!(color(1, [0.2, 0.3, 0.5]), Vec3::X);
+    // The second square: its lower edge is black, its upper one white, where the texture's rows have their middle.
+    let [low, high] = [0.25, 0.75].map(|v| {
+        // Along the diagonal from the first corner (0, 0) to the third (1, 1).
+        color(2, [1.0 - v, 0.0, v])
+    });
+    assert_eq!((low, high), (Vec3::ZERO, Vec3::ONE));
+    let average = paint.color(&diffuse.mesh, 2, [0.75, 0.0, 0.25], 1.0);
+    assert!((average.x - 0.5).abs() < 0.01, "a surfel as large as the square: {average}");
+    // As one thing, the mirror is plain.
+    let one = model.merged(Path::new("a.obj")).unwrap();
+    assert_eq!(one.mesh.triangles().len(), 6);
+    assert!(one.mirror.is_none());
+    assert_eq!(one.paint.unwrap().color(&one.mesh, 0, [1.0, 0.0, 0.0], 0.0), Vec3::X);
+}
+
+#[test]
+fn what_materials_lack_is_noted() {
+    let model = painted("newmtl wood\nmap_Kd w.png\n");
+    assert!(model.notes[0].contains("w.png does not exist"), "{:?}", model.notes);
+    let model = painted("newmtl wood\nKd 1 1 1\nmap_Kd ../w.png\n");
+    assert!(model.notes[0].contains("--allow-outside"), "{:?}", model.notes);
+    let model = painted("newmtl wood\nmap_Kd a.obj\n");
+    assert!(model.notes[0].contains("shown without this texture"), "{:?}", model.notes);
+    // Without any material the mesh is as plain as without a library.
+    let model = painted("hello");
+    assert_eq!((model.parts.len(), model.parts[0].paint.is_none()), (1, true));
+    let alone = load("a.obj", PAINTED.as_bytes()).unwrap();
+    assert_eq!(alone.triangles().len(), 6);
+    // High specular with little diffuse is a mirror, glossy paint is not.
+    for (line, mirrors) in [("Kd 0.2 0.2 0.2\nKs 1 1 1", 1), ("Kd 0.8 0.8 0.8\nKs 1 1 1", 0)] {
+        let model = painted(&format!("newmtl red\n{line}\nillum 2\n"));
+        assert_eq!(model.parts.iter().filter(|p| p.mirror.is_some()).count(), mirrors, "{line}");
     }
 }
