@@ -78,6 +78,9 @@ pub(crate) struct PlaceArgs {
     /// Object: a mesh file, used as placed, or a built-in shape; repeatable
     #[arg(long, value_name = "FILE|NAME")]
     pub(crate) object: Vec<String>,
+    /// Environment: a panorama (equirectangular HDR, EXR, PNG or JPEG), its middle along -z, instead of the scene's
+    #[arg(long, value_name = "FILE")]
+    pub(crate) environment: Option<PathBuf>,
     /// Seed of the sampling
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     pub(crate) seed: u64,
@@ -140,6 +143,7 @@ impl PlaceArgs {
             mirror: Vec::new(),
             proxy: Vec::new(),
             object: Vec::new(),
+            environment: None,
             seed: 1,
             eye: None,
             target: None,
@@ -162,6 +166,7 @@ impl PlaceArgs {
             mirrors: self.mirror.clone(),
             objects: self.object.clone(),
             proxies: self.proxy.clone(),
+            environment: self.environment.clone(),
             eye: self.eye,
             target: self.target,
             fov_y_deg: self.fov,

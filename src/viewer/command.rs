@@ -28,6 +28,10 @@ pub(super) fn equivalent(viewer: &Viewer) -> (String, Option<&'static str>) {
                 word(&mut line, name);
             }
         }
+        if let Some(panorama) = &request.environment {
+            line += " --environment";
+            word(&mut line, &panorama.to_string_lossy());
+        }
         let eye = viewer.eye;
         for (flag, p) in [("--eye", eye.position), ("--target", eye.target)] {
             let _ = write!(line, " {flag} {},{},{}", p.x, p.y, p.z);

@@ -6,10 +6,13 @@
 use std::fs;
 use std::path::Path;
 
+pub use environment::environment;
+
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, MeshDefect};
 
+mod environment;
 mod obj;
 mod ply;
 pub mod points;

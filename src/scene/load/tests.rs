@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::*;
 
+mod environment;
 mod obj;
 mod ply;
 
