@@ -20,8 +20,8 @@ struct Look {
     /// How far above a surface shadow rays start, scene units.
     apart: f32,
     zenith: vec3<f32>,
-    /// Whether the sky has parts; else it is `zenith`.
-    is_sky: u32,
+    /// CONSTANT_SKY: `zenith` everywhere; CLEAR_SKY: it has parts; else the panorama.
+    environment: u32,
     horizon: vec3<f32>,
     /// Units of the triangles' tree per scene unit; 0: there are no triangles.
     scale: f32,
@@ -40,6 +40,8 @@ struct Look {
 const NONE: u32 = 0xffffffffu;
 const MIXED: u32 = 0x80000000u;
 const SKY: u32 = NONE;
+const CONSTANT_SKY: u32 = 0u;
+const CLEAR_SKY: u32 = 1u;
 
 struct Seen {
     /// SKY, or an index.
@@ -131,8 +133,11 @@ fn smooth_step(begin: f32, end: f32, x: f32) -> f32 {
 
 /// Radiance from a unit direction.
 fn sky(direction: vec3<f32>) -> vec3<f32> {
-    if look.is_sky == 0u {
+    if look.environment == CONSTANT_SKY {
         return look.zenith;
+    }
+    if look.environment != CLEAR_SKY {
+        return panorama_at(direction);
     }
     let above = smooth_step(-HORIZON_BLUR, HORIZON_BLUR, direction.y);
     let air = 1.0 - clamp(direction.y, 0.0, 1.0);

@@ -82,6 +82,9 @@ pub(crate) struct PlaceArgs {
     pub(crate) object: Vec<String>,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
+    /// Environment: a panorama (equirectangular HDR, EXR, PNG or JPEG), its middle along -z, instead of the scene's
+    #[arg(long, value_name = "FILE")]
+    pub(crate) environment: Option<PathBuf>,
     /// Seed of the sampling
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     pub(crate) seed: u64,
@@ -188,6 +191,7 @@ impl PlaceArgs {
             proxy: Vec::new(),
             object: Vec::new(),
             read: ReadArgs::default(),
+            environment: None,
             seed: 1,
             eye: None,
             target: None,
@@ -211,6 +215,7 @@ impl PlaceArgs {
             mirrors: self.mirror.clone(),
             objects: self.object.clone(),
             proxies: self.proxy.clone(),
+            environment: self.environment.clone(),
             eye: self.eye,
             target: self.target,
             fov_y_deg: self.fov,

@@ -9,6 +9,8 @@ use fearless_simd::{
     u32x16,
 };
 
+pub mod gather;
+
 /// A scalar that camera constants are stored in.
 pub trait Scalar:
     Copy

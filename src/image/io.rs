@@ -1,4 +1,4 @@
-//! Picture files: PNG, OpenEXR and Radiance HDR.
+//! Picture files: PNG, OpenEXR and Radiance HDR; JPEG in only.
 //!
 //! Files are encoded in memory and come to their place whole or not at all.
 
@@ -114,13 +114,17 @@ pub fn png(picture: &Picture) -> Result<Vec<u8>> {
     encode_png(picture).map_err(|error| output_error(Path::new("a picture"), error))
 }
 
-/// Reads a picture: PNG (sRGB, decoded to linear; alpha and colour profiles are ignored), EXR (channels R, G, B
+/// Reads a picture: PNG and JPEG (sRGB, decoded to linear; alpha and colour profiles are ignored), EXR (channels R, G, B
 /// of its first layer that has them) or HDR. The format is told by the content.
 ///
 /// # Errors
 /// Missing, empty, truncated, of another format, more than 512 MiB decoded, or a value that is not finite.
 pub fn read_picture(path: &Path) -> Result<Picture> {
     let bytes = read_bytes(path)?;
+    if is_cut_jpeg(&bytes) {
+        let problem = "damaged or truncated: the picture ends in the middle";
+        return Err(Error::file(path, "", problem, "write it again, or give another picture"));
+    }
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|error| picture_error(path, &error.into()))?;
@@ -144,6 +148,13 @@ pub fn read_picture(path: &Path) -> Result<Picture> {
         return Err(not_finite(path, "", i, width));
     }
     Ok(Picture { width, height, rgb })
+}
+
+/// The decoder fills up with grey what is missing. In a scan every byte 0xff is marked as data: what looks like a picture's end
+/// is one.
+fn is_cut_jpeg(bytes: &[u8]) -> bool {
+    let last = |mark: [u8; 2]| bytes.windows(2).rposition(|pair| pair == mark);
+    bytes.starts_with(&[0xff, 0xd8]) && last([0xff, 0xda]) > last([0xff, 0xd9])
 }
 
 /// The whole file.
@@ -189,14 +200,16 @@ pub(super) fn plain(error: &std::io::Error) -> String {
     }
 }
 
-fn picture_error(path: &Path, error: &ImageError) -> Error {
+pub(super) fn picture_error(path: &Path, error: &ImageError) -> Error {
     let (problem, remedy) = match error {
         ImageError::Limits(_) => ("more than 512 MiB decoded".into(), "give a smaller picture"),
-        ImageError::Unsupported(_) => {
-            ("not a picture in a format that can be read".into(), "give a PNG, EXR or HDR file")
-        }
+        ImageError::Unsupported(_) => (
+            "not a picture in a format that can be read".into(),
+            "give a PNG, EXR, HDR or JPEG file",
+        ),
         error => {
-            (format!("damaged or truncated: {error}"), "write it again, or give another picture")
+            let said = error.to_string().trim().replace('\n', " ");
+            (format!("damaged or truncated: {said}"), "write it again, or give another picture")
         }
     };
     Error::file(path, "", problem, remedy)

@@ -6,6 +6,8 @@ pub mod color;
 pub mod compare;
 pub mod flip;
 #[cfg(feature = "cli")]
+pub mod header;
+#[cfg(feature = "cli")]
 pub mod io;
 pub mod picture;
 pub mod planes;

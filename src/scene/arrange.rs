@@ -1,10 +1,11 @@
 //! The scene that a command line asks for: a scene, models beside the teapot, or files as placed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3, Vec3};
 
 use super::description::{EyeDescription, Mirror, Object, Paint, Scene};
+use super::environment::image::Mounting;
 use super::file::{self, DEFAULT_FOV_Y_DEG, DEFAULT_SKY, PARALLEL, default_light, plain_paint};
 use super::fit::fit;
 use super::library::{Found, Library, stem, unique};
@@ -28,6 +29,8 @@ pub struct Request {
     pub proxies: Vec<String>,
     /// Instead of the scene's objects: files, as placed, and built-in shapes, beside the teapot.
     pub objects: Vec<String>,
+    /// Instead of the scene's: a panorama's file, mounted as it is.
+    pub environment: Option<PathBuf>,
     /// Instead of the scene's.
     pub eye: Option<DVec3>,
     /// Instead of the scene's.
@@ -109,6 +112,9 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
         mirror.proxy = Some(library.proxy(input, &mirror.mesh, |problem, remedy| {
             Error::input("--proxy", "", problem, format!("{remedy}; files end in {}", known()))
         })?);
+    }
+    if let Some(panorama) = &request.environment {
+        scene.environment = load::environment(panorama, Mounting::default(), cx)?;
     }
     override_eye(&mut scene.eye, request)?;
     scene.notes.append(&mut library.notes);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
 
+use super::environment::image::EnvironmentImage;
 use super::materials::Materials;
 use crate::geometry::lanes::Real;
 use crate::geometry::{Mesh, Similarity, Surfels};
@@ -208,7 +209,7 @@ impl PatternKind {
 }
 
 /// What a ray meets that meets nothing else: a function of its direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Environment {
     /// The same everywhere, linear RGB.
     Constant(Vec3),
@@ -221,6 +222,8 @@ pub enum Environment {
         /// Below the horizon, linear RGB.
         ground: Vec3,
     },
+    /// A panorama. It has its own sun, if any: the light's disc is not drawn over it.
+    Image(Arc<EnvironmentImage>),
 }
 
 /// One distant sun and an ambient term.

@@ -1,8 +1,12 @@
 //! What a ray meets that meets nothing else.
 
+pub mod image;
+mod resample;
+
 use glam::Vec3;
 
 use super::description::{Environment, Light};
+use crate::geometry::lanes::gather::Gather;
 use crate::geometry::lanes::{Real, dot_const};
 
 /// Half the height of the band in which the sky turns into the ground, as y of a unit direction.
@@ -25,13 +29,14 @@ impl Environment {
 
     /// [`Self::radiance`], in lanes.
     #[inline(always)]
-    pub fn radiance_in<R: Real<Scalar = f32>>(&self, direction: [R; 3], light: &Light) -> [R; 3] {
+    pub fn radiance_in<R: Gather>(&self, direction: [R; 3], light: &Light) -> [R; 3] {
         let height = direction[1];
-        let (zenith, horizon, ground) = match *self {
+        let (zenith, horizon, ground) = match self {
             Self::Constant(Vec3 { x, y, z }) => {
-                return [height.splat(x), height.splat(y), height.splat(z)];
+                return [height.splat(*x), height.splat(*y), height.splat(*z)];
             }
             Self::Sky { zenith, horizon, ground } => (zenith, horizon, ground),
+            Self::Image(image) => return image.radiance_in(direction),
         };
         let (zero, one) = (height.splat(0.0), height.splat(1.0));
         let above = smooth_step(-HORIZON_BLUR, HORIZON_BLUR, height);

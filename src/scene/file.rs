@@ -11,7 +11,7 @@
 //! to_sun = [0.4, 0.8, 0.45]          # any length
 //! sun = [0.9, 0.85, 0.75]
 //! ambient = "#9ca8bc"
-//! [environment]                      # optional; or kind = "constant" and color
+//! [environment]                      # optional; or kind = "constant" and color, or kind = "image" (see below)
 //! kind = "sky"
 //! zenith = [0.1, 0.3, 0.7]
 //! horizon = [0.7, 0.8, 0.95]
@@ -33,7 +33,9 @@
 //!
 //! Colours are `[r, g, b]` in linear light or "#rrggbb" in sRGB. An object has a `color` or a `pattern`
 //! ("checker", "stripes" or "rings"; the period is in local units), or else its vertex colours, or else it is
-//! light grey. Instead of `scale` and `translate`, `fit` gives the diagonal of the bounding box after the
+//! light grey. An environment of the kind "image" is a panorama (`file`, relative to the scene file; equirectangular HDR, EXR,
+//! PNG or JPEG), turned by `rotate_deg` about y and made 2 to the power of `exposure` times as bright; see
+//! [`Mounting`](super::environment::image::Mounting). Instead of `scale` and `translate`, `fit` gives the diagonal of the bounding box after the
 //! rotation and where the middle of its bottom lies.
 
 use std::path::{Path, PathBuf};
@@ -45,6 +47,7 @@ use super::builtin;
 use super::description::{
     Environment, EyeDescription, Light, Mirror, Object, Paint, PatternKind, Proxy, Scene,
 };
+use super::environment::image::Mounting;
 use super::fit::fit;
 use super::library::{Found, Library, stem, unique};
 use super::load::{self, Nearby, ReadOptions};
@@ -154,7 +157,7 @@ pub fn parse(
         eye: source.eye(&table.eye)?,
         mirrors,
         objects,
-        environment: source.environment(table.environment.as_ref())?,
+        environment: source.environment(table.environment.as_ref(), &library)?,
         light: light(table.light.unwrap_or_default()),
         notes: library.notes,
     })
@@ -278,14 +281,40 @@ impl Text<'_> {
         Ok(eye)
     }
 
-    fn environment(&self, table: Option<&Spanned<EnvironmentTable>>) -> Result<Environment> {
+    fn environment(
+        &self,
+        table: Option<&Spanned<EnvironmentTable>>,
+        library: &Library,
+    ) -> Result<Environment> {
         let (Some(spanned), Environment::Sky { zenith, horizon, ground }) = (table, DEFAULT_SKY)
         else {
             return Ok(DEFAULT_SKY);
         };
-        let error = |problem| self.error(spanned.span().start, problem, "correct this table");
+        let error = |problem: &str| self.error(spanned.span().start, problem, "correct this table");
         let table = spanned.get_ref();
         let or = |given: Option<Color>, default| given.map_or(default, |c| c.0);
+        let colors = [table.color, table.zenith, table.horizon, table.ground];
+        let of_image = table.file.is_some() || table.rotate_deg.or(table.exposure).is_some();
+        match (&table.kind, &table.file) {
+            (EnvironmentName::Image, Some(Name(file))) if colors.iter().all(Option::is_none) => {
+                let mounting = Mounting {
+                    rotate_deg: table.rotate_deg.map_or(0.0, |v| v.0),
+                    exposure: table.exposure.map_or(0.0, |v| v.0),
+                };
+                if let Some(problem) = mounting.defect() {
+                    return Err(error(&problem));
+                }
+                let path = self.file(spanned.span().start, file, library)?;
+                return load::environment(&path, mounting, library.cx);
+            }
+            (EnvironmentName::Image, _) => {
+                return Err(error("an image has file, rotate_deg and exposure, and no colours"));
+            }
+            _ if of_image => {
+                return Err(error("only kind = \"image\" has file, rotate_deg and exposure"));
+            }
+            _ => {}
+        }
         match (&table.kind, table.color, [table.zenith, table.horizon, table.ground]) {
             (EnvironmentName::Sky, Some(_), _) => {
                 Err(error("a sky has zenith, horizon and ground instead of color"))
@@ -298,7 +327,7 @@ impl Text<'_> {
             (EnvironmentName::Constant, Some(color), [None, None, None]) => {
                 Ok(Environment::Constant(color.0))
             }
-            (EnvironmentName::Constant, ..) => {
+            (EnvironmentName::Constant | EnvironmentName::Image, ..) => {
                 Err(error("a constant environment has color and nothing else"))
             }
         }

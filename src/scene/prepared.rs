@@ -309,7 +309,7 @@ impl PreparedScene {
             triangles: TriangleBvh::build(&[]),
             mirror_triangles: TriangleBvh::build(&[]),
             sun_map: SunMap::default(),
-            environment: scene.environment,
+            environment: scene.environment.clone(),
             light: scene.light,
             times,
             version: another_version(),

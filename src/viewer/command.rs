@@ -33,6 +33,10 @@ pub(super) fn equivalent(viewer: &Viewer) -> (String, Option<&'static str>) {
         if let Some(up) = request.up {
             let _ = write!(line, " --up {}", if up == UpAxis::Z { "z" } else { "y" });
         }
+        if let Some(panorama) = &request.environment {
+            line += " --environment";
+            word(&mut line, &panorama.to_string_lossy());
+        }
         let eye = viewer.eye;
         for (flag, p) in [("--eye", eye.position), ("--target", eye.target)] {
             let _ = write!(line, " {flag} {},{},{}", p.x, p.y, p.z);

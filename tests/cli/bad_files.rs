@@ -202,6 +202,18 @@ fn bad_scenes() {
         (with("[[mirror]]", "fov_y_deg = 180\n[[mirror]]"), "line 4: "),
         (with("[[mirror]]", "[[mirror]]\nname = 3"), "line 5: "),
         (
+            with("[[mirror]]", "[environment]\nkind = \"image\"\n[[mirror]]"),
+            "line 4: an image has file, rotate_deg and exposure, and no colours; ",
+        ),
+        (
+            with("[[mirror]]", "[environment]\nkind = \"image\"\nfile = \"no.hdr\"\n[[mirror]]"),
+            "no.hdr does not exist; ",
+        ),
+        (
+            with("[[mirror]]", "[environment]\nkind = \"sky\"\nexposure = 1\n[[mirror]]"),
+            "line 4: only kind = \"image\" has file, rotate_deg and exposure; ",
+        ),
+        (
             with(
                 cube,
                 "shape = \"cube\"\nname = \"x\"\n[[object]]\nshape = \"cube\"\nname = \"x\"",

@@ -158,7 +158,7 @@ fn comparisons_that_make_no_sense() {
         ("a.png none.png", ["none.png: does not exist", "check the name"]),
         ("a.png cut.png", ["cut.png: ", "damaged or truncated"]),
         ("void.png a.png", ["void.png: the file is empty", "write it again"]),
-        ("text.png a.png", ["text.png: not a picture", "give a PNG, EXR or HDR file"]),
+        ("text.png a.png", ["text.png: not a picture", "give a PNG, EXR, HDR or JPEG file"]),
         ("a.png a.png --aov-b b.png", ["b.png", "EXR"]),
         ("a.png a.png --json none/a.json", ["none/a.json", "cannot be written"]),
         ("a.png a.png --heatmap a.txt", ["a.txt", ".png, .exr or .hdr"]),

@@ -6,6 +6,7 @@ mod analyze;
 mod bad_files;
 mod bad_options;
 mod bench;
+mod environments;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod interrupt;

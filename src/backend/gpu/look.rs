@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use super::buffers::Grown;
 use super::device::Gpu;
-use super::pipelines::{compute, dispatch, group};
+use super::environment::Panorama;
+use super::pipelines::{bound, compute, dispatch};
 use super::shaders;
 use super::surfaces::{Surfaces, list_samples};
 use crate::camera::Eye;
@@ -36,7 +37,7 @@ pub(super) struct Uniform {
     pub(super) ambient: [f32; 3],
     pub(super) apart: f32,
     pub(super) zenith: [f32; 3],
-    pub(super) is_sky: u32,
+    pub(super) environment: u32,
     pub(super) horizon: [f32; 3],
     pub(super) scale: f32,
     pub(super) ground: [f32; 3],
@@ -59,6 +60,7 @@ pub(super) struct Composer {
     samples: Grown,
     list: Vec<u32>,
     scene: Option<Surfaces>,
+    panorama: Option<Panorama>,
     picture: Option<PictureLook>,
     /// Of these buffers: made when there were so many.
     groups: Option<(usize, [wgpu::BindGroup; 3])>,
@@ -75,6 +77,7 @@ impl Composer {
             samples: Grown::new("samples", U::STORAGE | U::COPY_DST),
             list: Vec::new(),
             scene: None,
+            panorama: None,
             picture: None,
             groups: None,
         })
@@ -98,6 +101,10 @@ impl Composer {
         if self.scene.as_ref().is_none_or(|s| s.version != version) {
             self.scene = None;
             self.scene = Some(Surfaces::new(gpu, scene, visibility)?);
+        }
+        if self.panorama.as_ref().is_none_or(|p| !p.is_of(&scene.environment)) {
+            self.panorama = None;
+            self.panorama = Some(Panorama::new(gpu, &scene.environment)?);
         }
         if self.picture.as_ref().is_none_or(|p| p.size != size) {
             self.picture = None;
@@ -159,6 +166,7 @@ impl Composer {
         reflection: &wgpu::Buffer,
     ) -> [wgpu::BindGroup; 3] {
         let Surfaces { triangles, surfaces, colors, nodes, obstacles, .. } = scene;
+        let panorama = self.panorama.as_ref().expect("it was uploaded");
         let common: [(u32, &wgpu::Buffer); 4] =
             [(0, &self.uniform), (1, self.samples.buffer()), (2, triangles), (3, surfaces)];
         let more: [&[(u32, &wgpu::Buffer)]; 3] = [
@@ -168,7 +176,10 @@ impl Composer {
         ];
         [0, 1, 2].map(|i| {
             let layout = self.pipelines[i].get_bind_group_layout(0);
-            group(gpu, &layout, common.iter().chain(more[i]))
+            let buffers = common.iter().chain(more[i]);
+            let buffers = buffers.map(|&(binding, buffer)| (binding, buffer.as_entire_binding()));
+            let panorama = (11, wgpu::BindingResource::TextureView(&panorama.view));
+            bound(gpu, &layout, buffers.chain([panorama]))
         })
     }
 }
@@ -195,9 +206,10 @@ fn uniform(
     white: f32,
     scale: f32,
 ) -> Uniform {
-    let (is_sky, [zenith, horizon, ground]) = match scene.environment {
+    let (environment, [zenith, horizon, ground]) = match scene.environment {
         Environment::Constant(color) => (0, [color; 3]),
         Environment::Sky { zenith, horizon, ground } => (1, [zenith, horizon, ground]),
+        Environment::Image(_) => (2, [Vec3::ZERO; 3]),
     };
     let count = |n: usize| u32::try_from(n).expect("as few as triangles");
     Uniform {
@@ -217,7 +229,7 @@ fn uniform(
         ambient: scene.light.ambient.to_array(),
         apart: Sun::new(&scene.triangles, &scene.light).apart,
         zenith: zenith.to_array(),
-        is_sky,
+        environment,
         horizon: horizon.to_array(),
         scale,
         ground: ground.to_array(),

@@ -7,6 +7,7 @@
 mod adapters;
 mod buffers;
 mod device;
+mod environment;
 mod look;
 mod pipelines;
 mod records;

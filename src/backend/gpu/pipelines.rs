@@ -296,12 +296,19 @@ pub(super) fn group<'a>(
     layout: &wgpu::BindGroupLayout,
     buffers: impl IntoIterator<Item = &'a (u32, &'a wgpu::Buffer)>,
 ) -> wgpu::BindGroup {
-    let entries: Vec<_> = buffers
+    let buffers = buffers.into_iter();
+    bound(gpu, layout, buffers.map(|&(binding, buffer)| (binding, buffer.as_entire_binding())))
+}
+
+/// Anything by binding.
+pub(super) fn bound<'a>(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    resources: impl IntoIterator<Item = (u32, wgpu::BindingResource<'a>)>,
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = resources
         .into_iter()
-        .map(|&(binding, buffer)| wgpu::BindGroupEntry {
-            binding,
-            resource: buffer.as_entire_binding(),
-        })
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
         .collect();
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,

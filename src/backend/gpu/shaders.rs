@@ -46,6 +46,7 @@ const CUBE: &str = file!("camera/reflector/cube.wgsl");
 const ESTALELLA: &str = file!("camera/reflector/estalella.wgsl");
 const ROGER: &str = file!("camera/reflector/roger.wgsl");
 const LOOK: &str = file!("look.wgsl");
+const PANORAMA: &str = file!("scene/environment.wgsl");
 const SHADOW: &str = file!("shadow.wgsl");
 const DIRECT: &str = file!("passes/direct.wgsl");
 const ENVIRONMENT: &str = file!("passes/environment.wgsl");
@@ -199,9 +200,9 @@ pub(super) fn looks() -> [(String, &'static str); 3] {
         writeln!(text, "const {name}: u32 = {value}u;").expect("strings grow");
     }
     [
-        ([&text, LOOK, SHADOW, DIRECT].concat(), "draw_direct"),
-        ([&text, LOOK, ENVIRONMENT].concat(), "complete"),
-        ([&text, LOOK, COMPOSITE].concat(), "compose"),
+        ([&text, LOOK, PANORAMA, SHADOW, DIRECT].concat(), "draw_direct"),
+        ([&text, LOOK, PANORAMA, ENVIRONMENT].concat(), "complete"),
+        ([&text, LOOK, PANORAMA, COMPOSITE].concat(), "compose"),
     ]
 }
 

@@ -3,6 +3,7 @@
 mod footprints;
 mod looks;
 mod mutants;
+mod panoramas;
 mod pictures;
 mod reflected;
 mod searches;
@@ -41,6 +42,18 @@ fn run(
     outputs: usize,
     groups: u32,
 ) -> Vec<[f32; 4]> {
+    run_with(gpu, text, lists, &[], outputs, groups)
+}
+
+/// [`run`], with textures by binding.
+fn run_with(
+    gpu: &Device,
+    text: &str,
+    lists: &[(u32, &[Row])],
+    textures: &[(u32, &wgpu::TextureView)],
+    outputs: usize,
+    groups: u32,
+) -> Vec<[f32; 4]> {
     use wgpu::BufferUsages as U;
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: None,
@@ -66,12 +79,12 @@ fn run(
         buffers.push((*binding, buffer));
     }
     buffers.push((20, out.clone()));
+    let buffers = buffers.iter().map(|(binding, buffer)| (*binding, buffer.as_entire_binding()));
+    let views =
+        textures.iter().map(|(binding, view)| (*binding, wgpu::BindingResource::TextureView(view)));
     let entries: Vec<_> = buffers
-        .iter()
-        .map(|(binding, buffer)| wgpu::BindGroupEntry {
-            binding: *binding,
-            resource: buffer.as_entire_binding(),
-        })
+        .chain(views)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
         .collect();
     let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,

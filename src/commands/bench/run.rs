@@ -331,7 +331,8 @@ fn inputs(place: &PlaceArgs) -> Vec<Value> {
         let sum = format!("{:08x}", crc32fast::hash(&bytes));
         Some(json!({ "file": name, "bytes": bytes.len(), "crc32": sum }))
     };
-    given.into_iter().flatten().filter_map(file).collect()
+    let panorama = place.environment.as_ref().map(|path| path.display().to_string());
+    given.into_iter().flatten().chain(&panorama).filter_map(file).collect()
 }
 
 /// With what must be said of it.

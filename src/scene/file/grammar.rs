@@ -51,6 +51,9 @@ pub(super) struct EnvironmentTable {
     pub horizon: Option<Color>,
     pub ground: Option<Color>,
     pub color: Option<Color>,
+    pub file: Option<Name>,
+    pub rotate_deg: Option<Finite>,
+    pub exposure: Option<Finite>,
 }
 
 /// Which environment.
@@ -59,6 +62,7 @@ pub(super) struct EnvironmentTable {
 pub(super) enum EnvironmentName {
     Sky,
     Constant,
+    Image,
 }
 
 /// `[[mirror]]`

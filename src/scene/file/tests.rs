@@ -220,7 +220,7 @@ fn bad_scenes() {
         ),
         (
             format!("{EYE}{MIRROR}[environment]\nkind = \"fog\"\n"),
-            "line 7: unknown variant `fog`, expected `sky` or `constant`",
+            "line 7: unknown variant `fog`, expected one of `sky`, `constant`, `image`",
         ),
         (format!("{EYE}{MIRROR}[light]\nmoon = 1\n"), "line 7: unknown field `moon`"),
         (

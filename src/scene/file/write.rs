@@ -16,6 +16,7 @@ use crate::image::io::write_bytes;
 use crate::scene::description::{
     Environment, Mirror, Object, Paint, PatternKind, Proxy, Scene, Source,
 };
+use crate::scene::environment::image::Mounting;
 use crate::scene::load::linear_from_srgb;
 
 /// Writes a scene file, whole or not at all.
@@ -43,7 +44,7 @@ pub fn to_toml(scene: &Scene) -> Result<String> {
         out.entry("sun", &Color::new(scene.light.sun));
         out.entry("ambient", &Color::new(scene.light.ambient));
     }
-    out.environment(&scene.environment);
+    out.environment(&scene.environment)?;
     for mirror in &scene.mirrors {
         let Mirror { name, mesh: _, source, transform, tint, proxy } = mirror;
         out.table("[[mirror]]");
@@ -111,23 +112,42 @@ impl Lines {
         }
     }
 
-    fn environment(&mut self, environment: &Environment) {
+    fn environment(&mut self, environment: &Environment) -> Result<()> {
         if *environment == DEFAULT_SKY {
-            return;
+            return Ok(());
         }
         self.table("[environment]");
-        match *environment {
-            Environment::Constant(color) => {
+        match environment {
+            &Environment::Constant(color) => {
                 self.entry("kind", &"constant");
                 self.entry("color", &Color::new(color));
             }
-            Environment::Sky { zenith, horizon, ground } => {
+            Environment::Image(image) => {
+                const NAME: &str = "the environment";
+                let refused = |problem: &str, remedy: &str| Error::input(NAME, "", problem, remedy);
+                let remedy = "save its picture to a file, and make the scene with that";
+                let path = image.source.as_ref();
+                let path = path.ok_or_else(|| refused("its picture comes from no file", remedy))?;
+                let path = path.to_str().ok_or_else(|| {
+                    refused("the path of its file is not Unicode", "rename the file")
+                })?;
+                self.entry("kind", &"image");
+                self.entry("file", &path);
+                let Mounting { rotate_deg, exposure } = image.mounting();
+                for (key, value) in [("rotate_deg", rotate_deg), ("exposure", exposure)] {
+                    if value != 0.0 {
+                        self.entry(key, &value);
+                    }
+                }
+            }
+            &Environment::Sky { zenith, horizon, ground } => {
                 self.entry("kind", &"sky");
                 self.entry("zenith", &Color::new(zenith));
                 self.entry("horizon", &Color::new(horizon));
                 self.entry("ground", &Color::new(ground));
             }
         }
+        Ok(())
     }
 
     fn source(&mut self, name: &str, source: Option<&Source>) -> Result<()> {

@@ -5,6 +5,7 @@ use crate::context::Context;
 use crate::scene::arrange::{self, Request};
 use crate::scene::builtin;
 use crate::scene::description::{EyeDescription, Light};
+use crate::scene::environment::image::EnvironmentImage;
 use crate::scene::file::parse;
 use crate::scene::load::ReadOptions;
 
@@ -173,6 +174,47 @@ fn arranged_models_come_back() {
             .unwrap();
         assert_eq!(difference(&scene, &read), None);
     }
+}
+
+#[test]
+fn panoramas_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut picture = crate::image::Picture::black(64, 32);
+    for (i, color) in picture.rgb.iter_mut().enumerate() {
+        *color = [i as f32, 0.5, 7.0];
+    }
+    let path = folder.path().join("my sky.exr");
+    crate::image::io::write_picture(&path, &picture).unwrap();
+    let text = "[eye]\nposition = [0, 1, 3]\ntarget = [0, 0, 0]\n[[mirror]]\nshape = \"sphere\"\n\
+        [environment]\nkind = \"image\"\nfile = \"my sky.exr\"\nrotate_deg = 30\nexposure = -0.5\n";
+    let scene =
+        parse(text, "sky.toml", folder.path(), &ReadOptions::default(), &Context::default())
+            .unwrap();
+    let Environment::Image(image) = &scene.environment else { panic!() };
+    let mounting = Mounting { rotate_deg: 30.0, exposure: -0.5 };
+    assert_eq!(image.mounting(), mounting);
+    let written = to_toml(&scene).unwrap();
+    let path = path.canonicalize().unwrap();
+    let part = format!(
+        "[environment]\nkind = \"image\"\nfile = \"{}\"\nrotate_deg = 30.0\nexposure = -0.5\n",
+        path.display()
+    );
+    assert!(written.contains(&part), "{written}");
+    assert_eq!(difference(&scene, &read_back(&scene)), None);
+    let mut other = scene.clone();
+    let turned = Mounting { rotate_deg: 31.0, ..mounting };
+    other.environment =
+        crate::scene::load::environment(&path, turned, &Context::default()).unwrap();
+    assert_eq!(difference(&scene, &read_back(&other)).as_deref(), Some("environment"));
+    let made = EnvironmentImage::new(&picture, mounting, &Context::default()).unwrap();
+    other.environment = Environment::Image(made.into());
+    let refused = to_toml(&other).unwrap_err().to_string();
+    assert!(refused.starts_with("the environment: its picture comes from no file"), "{refused}");
+    // On the command line it replaces the scene's, mounted plainly.
+    let request = Request { environment: Some(path.clone()), ..Request::default() };
+    let scene = arrange::scene(&request, &Context::default()).unwrap();
+    let Environment::Image(image) = &scene.environment else { panic!() };
+    assert_eq!((image.mounting(), image.source.as_ref()), (Mounting::default(), Some(&path)));
 }
 
 #[test]

@@ -7,6 +7,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use std::fs;
 use std::path::Path;
 
+pub use environment::environment;
 use glam::DQuat;
 
 use crate::context::Context;
@@ -14,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::geometry::MeshDefect;
 pub(super) use crate::image::color::srgb_to_linear as linear_from_srgb;
 
+mod environment;
 mod gltf;
 mod model;
 mod mtl;

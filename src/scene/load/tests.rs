@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::*;
 use crate::geometry::Mesh;
 
+mod environment;
 mod obj;
 mod ply;
 mod stl;

@@ -34,7 +34,7 @@ const EYE: EyeDescription = EyeDescription {
 };
 
 /// Every paint, with shadows on each other, before a sky with its sun in view; one mirror hides another.
-fn scene(environment: Environment) -> PreparedScene {
+pub(super) fn scene(environment: Environment) -> PreparedScene {
     let shape = |name: &str| Arc::new(builtin::shape(name, Some(1500)).expect("it is built in"));
     let at = |x: f64, y: f64, z: f64, scale: f64| Similarity {
         translation: DVec3::new(x, y, z),
@@ -128,7 +128,7 @@ const SKY: Environment = Environment::Sky {
     ground: Vec3::new(0.25, 0.22, 0.2),
 };
 
-fn picture(
+pub(super) fn picture(
     backend: Box<dyn Backend>,
     scene: &PreparedScene,
     bright: bool,
@@ -147,7 +147,7 @@ fn picture(
     (renderer.picture().clone(), planes.radiance.clone())
 }
 
-fn gpu() -> Box<Gpu> {
+pub(super) fn gpu() -> Box<Gpu> {
     let options = Options { composes: Some(true), ..Options::default() };
     Box::new(Gpu::new(options).unwrap_or_else(|e| panic!("{e}")))
 }
@@ -157,7 +157,7 @@ const OTHERS: f64 = 2e-3;
 /// By more than this share of a value.
 const APART: f32 = 0.01;
 
-fn verdict(cpu: &[[f32; 3]], gpu: &[[f32; 3]]) -> Result<(), String> {
+pub(super) fn verdict(cpu: &[[f32; 3]], gpu: &[[f32; 3]]) -> Result<(), String> {
     let apart = |a: f32, b: f32| {
         let apart = (a - b).abs();
         apart.is_nan() || apart > APART * a.abs().max(0.2)
@@ -423,7 +423,7 @@ fn the_uniform_is_the_shaders() {
         ambient,
         apart,
         zenith,
-        is_sky,
+        environment,
         horizon,
         scale,
         ground,
