@@ -15,6 +15,8 @@ mod library;
 pub mod load;
 pub mod prepared;
 pub mod sample;
+#[cfg(feature = "cli")]
+pub mod scan;
 pub mod shade;
 pub mod sun_map;
 
