@@ -16,6 +16,8 @@ pub mod load;
 pub mod materials;
 pub mod prepared;
 pub mod sample;
+#[cfg(feature = "cli")]
+pub mod scan;
 pub mod shade;
 pub mod sun_map;
 

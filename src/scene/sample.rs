@@ -27,6 +27,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub use allot::allot;
+#[cfg(feature = "cli")]
+pub(in crate::scene) use candidates::{hash, index};
 
 use self::blocks::Blocks;
 use self::candidates::{Candidate, Candidates};

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
@@ -132,13 +132,14 @@ fn least_bytes(data_type: &PropertyType) -> usize {
 
 /// Which optional properties all vertices have.
 pub(super) struct Layout {
-    normals: bool,
-    color_scale: Option<ColorScale>,
+    pub(super) normals: bool,
+    pub(super) color_scale: Option<ColorScale>,
+    pub(super) intensity: bool,
 }
 
 impl Layout {
     pub(super) fn of(path: &Path, vertex: Option<&ElementDef>) -> Result<Self> {
-        let mut types: [Option<&ScalarType>; 9] = [None; 9];
+        let mut types: [Option<&ScalarType>; SLOTS] = [None; SLOTS];
         for property in vertex.iter().flat_map(|v| v.properties.values()) {
             if let (Some(slot), PropertyType::Scalar(number)) =
                 (slot(&property.name), &property.data_type)
@@ -151,17 +152,18 @@ impl Layout {
         }
         Ok(Self {
             normals: !types[3..6].contains(&None),
-            color_scale: match types[6..] {
+            color_scale: match types[6..9] {
                 [Some(red), Some(_), Some(_)] => Some(ColorScale::of(red)),
                 _ => None,
             },
+            intensity: types[9].is_some(),
         })
     }
 }
 
 /// How a stored colour becomes a linear one.
 #[derive(Clone, Copy)]
-enum ColorScale {
+pub(super) enum ColorScale {
     /// Stored as it is.
     Linear,
     /// sRGB with this as white.
@@ -189,22 +191,26 @@ impl ColorScale {
 /// Any element: the numbers that matter, each in its slot, and a polygon. f64 holds every number of PLY.
 #[derive(Default)]
 pub(super) struct Record {
-    values: [f64; 9],
+    pub(super) values: [f64; SLOTS],
     polygon: Vec<f64>,
 }
 
-/// Where a vertex property goes: position 0–2, normal 3–5, colour 6–8.
-fn slot(name: &str) -> Option<usize> {
+/// Numbers of a vertex that matter.
+pub(super) const SLOTS: usize = 10;
+
+/// Where a vertex property goes: position 0–2, normal 3–5, colour 6–8, intensity 9. The names of columns of text, too.
+pub(super) fn slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,
         "y" => 1,
         "z" => 2,
-        "nx" => 3,
-        "ny" => 4,
-        "nz" => 5,
+        "nx" | "normal_x" => 3,
+        "ny" | "normal_y" => 4,
+        "nz" | "normal_z" => 5,
         "red" | "r" | "diffuse_red" => 6,
         "green" | "g" | "diffuse_green" => 7,
         "blue" | "b" | "diffuse_blue" => 8,
+        "intensity" | "scalar_intensity" | "scalar_Intensity" | "reflectance" => 9,
         _ => return None,
     })
 }
@@ -218,11 +224,6 @@ impl Record {
         if let Some(slot) = slot(name) {
             self.values[slot] = value;
         }
-    }
-
-    /// Position, as exactly as the file has it.
-    pub(super) fn position(&self) -> DVec3 {
-        DVec3::from_slice(&self.values)
     }
 
     /// Position, normal and colour.

@@ -159,7 +159,7 @@ fn even_bits(bits: u64) -> u32 {
 }
 
 /// SplitMix64 (Steele, Lea & Flood 2014): a well-mixed word a number.
-pub(super) fn hash(number: u64) -> u64 {
+pub(in crate::scene) fn hash(number: u64) -> u64 {
     let mut z = number.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -167,11 +167,11 @@ pub(super) fn hash(number: u64) -> u64 {
 }
 
 /// A random word as a number in `0..1`.
-pub(super) fn unit(word: u64) -> f64 {
+pub(in crate::scene) fn unit(word: u64) -> f64 {
     (word >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// An index that is known to fit.
-pub(super) fn index(i: usize) -> u32 {
+pub(in crate::scene) fn index(i: usize) -> u32 {
     u32::try_from(i).expect("fewer than 2^32 triangles and candidates")
 }

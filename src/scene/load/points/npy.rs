@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use glam::DVec3;
 use npyz::{Deserialize, NpyHeader, Order, TypeRead};
 
-use super::{Input, LONGEST, Source};
+use super::{FilePoint, Input, LONGEST, Source};
 use crate::error::Result;
 use crate::scene::load::GET_IT_AGAIN;
 
@@ -57,7 +57,7 @@ impl Rows {
 }
 
 impl Source for Rows {
-    fn next(&mut self, input: &mut Input, index: u64) -> Result<Option<DVec3>> {
+    fn next(&mut self, input: &mut Input, index: u64) -> Result<Option<FilePoint>> {
         if index >= self.rows {
             return Ok(None);
         }
@@ -76,7 +76,7 @@ impl Source for Rows {
                 _ => {}
             }
         }
-        Ok(Some(point))
+        Ok(Some(FilePoint { position: point, ..Default::default() }))
     }
 
     fn place(&self, index: u64) -> String {

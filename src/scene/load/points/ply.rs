@@ -1,20 +1,24 @@
 //! The vertices of a PLY file, in any of its three encodings.
 
-use std::io;
+use std::io::{self, Read};
 
-use glam::DVec3;
 use ply_rs_bw::parser::{ParseError, Parser};
-use ply_rs_bw::ply::{ElementDef, Encoding};
+use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
 
-use super::{Input, LONGEST, Source};
+use super::{Colors, FilePoint, Input, LONGEST, PointLayout, Source};
 use crate::error::Result;
-use crate::scene::load::ply::{Layout, Record, first_line, header, text_record};
+use crate::scene::load::ply::{
+    ColorScale, Layout, Record, SLOTS, first_line, header, slot, text_record,
+};
 use crate::scene::load::{GET_IT_AGAIN, REPAIR};
 
 pub(super) struct Vertices {
     vertex: ElementDef,
     encoding: Encoding,
     parser: Parser<Record>,
+    /// For vertices without lists in a binary file.
+    rows: Option<FixedRows>,
+    layout: PointLayout,
 }
 
 impl Vertices {
@@ -28,11 +32,18 @@ impl Vertices {
             }
         }
         let (header, ..) = header(&input.path, &text)?;
-        Layout::of(&input.path, header.elements.get("vertex"))?;
+        let layout = Layout::of(&input.path, header.elements.get("vertex"))?;
+        let colors = match layout.color_scale {
+            Some(ColorScale::Linear) => Some(Colors::Linear),
+            Some(ColorScale::Srgb(white)) => Some(Colors::Srgb(white)),
+            None => layout.intensity.then_some(Colors::Intensity),
+        };
         let mut vertices = Self {
             vertex: ElementDef::new("vertex".into()),
             encoding: header.encoding,
             parser: Parser::new(),
+            rows: None,
+            layout: PointLayout { normals: layout.normals, colors },
         };
         // Without properties they take no space, however many there are.
         let count = |e: &ElementDef| if e.properties.is_empty() { 0 } else { e.count as u64 };
@@ -46,6 +57,7 @@ impl Vertices {
         for element in header.elements.values() {
             if element.name == "vertex" {
                 vertices.vertex = element.clone();
+                vertices.rows = FixedRows::of(element, header.encoding);
                 break;
             }
             for index in 0..count(element) {
@@ -57,16 +69,81 @@ impl Vertices {
 }
 
 impl Source for Vertices {
-    fn next(&mut self, input: &mut Input, index: u64) -> Result<Option<DVec3>> {
+    fn layout(&self) -> PointLayout {
+        self.layout
+    }
+
+    fn next(&mut self, input: &mut Input, index: u64) -> Result<Option<FilePoint>> {
         if index >= self.vertex.count as u64 {
             return Ok(None);
         }
-        let record = read(input, &self.parser, self.encoding, &self.vertex, index)?;
-        Ok(Some(record.position()))
+        let values = match &mut self.rows {
+            Some(rows) => rows.next(input).map_err(|_| cut_off(input, &self.vertex, index))?,
+            None => read(input, &self.parser, self.encoding, &self.vertex, index)?.values,
+        };
+        Ok(Some(FilePoint::of_slots(&values, self.layout)))
     }
 
     fn place(&self, index: u64) -> String {
         format!("vertex {index}")
+    }
+}
+
+/// Binary elements without lists, which all have the same length: ten times as fast as the parser.
+struct FixedRows {
+    row: Vec<u8>,
+    /// Slot, place in the row and type of each number that matters.
+    numbers: Vec<(usize, usize, ScalarType)>,
+    little: bool,
+}
+
+impl FixedRows {
+    /// `None` if there are lists or it is text.
+    fn of(element: &ElementDef, encoding: Encoding) -> Option<Self> {
+        let little = match encoding {
+            Encoding::BinaryLittleEndian => true,
+            Encoding::BinaryBigEndian => false,
+            Encoding::Ascii => return None,
+        };
+        let (mut numbers, mut length) = (Vec::new(), 0);
+        for property in element.properties.values() {
+            let PropertyType::Scalar(number) = &property.data_type else { return None };
+            numbers.extend(slot(&property.name).map(|slot| (slot, length, number.clone())));
+            length += match number {
+                ScalarType::Char | ScalarType::UChar => 1,
+                ScalarType::Short | ScalarType::UShort => 2,
+                ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+                ScalarType::Double => 8,
+            };
+        }
+        Some(Self { row: vec![0; length], numbers, little })
+    }
+
+    fn next(&mut self, input: &mut Input) -> io::Result<[f64; SLOTS]> {
+        input.read_exact(&mut self.row)?;
+        let mut values = [0.0; SLOTS];
+        for (slot, at, number) in &self.numbers {
+            let little = self.little;
+            macro_rules! decode {
+                ($t:ty) => {{
+                    let mut bytes = [0; size_of::<$t>()];
+                    bytes.copy_from_slice(&self.row[*at..at + size_of::<$t>()]);
+                    let decode = if little { <$t>::from_le_bytes } else { <$t>::from_be_bytes };
+                    f64::from(decode(bytes))
+                }};
+            }
+            values[*slot] = match number {
+                ScalarType::Char => decode!(i8),
+                ScalarType::UChar => decode!(u8),
+                ScalarType::Short => decode!(i16),
+                ScalarType::UShort => decode!(u16),
+                ScalarType::Int => decode!(i32),
+                ScalarType::UInt => decode!(u32),
+                ScalarType::Float => decode!(f32),
+                ScalarType::Double => decode!(f64),
+            };
+        }
+        Ok(values)
     }
 }
 

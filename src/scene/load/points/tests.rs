@@ -108,7 +108,11 @@ fn what_is_no_file_of_points_is_refused() {
         ("a.xyz", long.as_bytes(), "line 1: is longer than 65536 bytes"),
         ("a.obj", b"f 1 2 3\n", "has no points"),
         ("a.obj", b"v 1 2\n", "line 1: has fewer than three numbers"),
-        ("a.stl", b"solid", "convert it: .ply, .obj, .xyz, .csv, .txt, .npy are supported"),
+        (
+            "a.stl",
+            b"solid",
+            "convert it: .ply, .obj, .xyz, .csv, .txt, .npy, .las, .laz are supported",
+        ),
         ("a.ply", b"1 2 3\n", "does not say \"ply\""),
         ("a.ply", &ply("ascii", 3, b"1 0\n2 0\n1 2 3\n"), "line 16: has fewer numbers"),
         ("a.ply", &ply("ascii", 9_999, b""), "promises 9999 elements \"vertex\""),

@@ -1,0 +1,72 @@
+//! The nearest neighbours of every point.
+
+use std::num::NonZero;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::{Mat3, Vec3};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use rayon::prelude::*;
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+
+/// For every point the same number of neighbours, nearest first, not itself.
+pub(super) struct Neighbors {
+    each: usize,
+    ids: Vec<u32>,
+}
+
+/// Points that are asked for between two looks at the context.
+const PART: usize = 1 << 13;
+
+/// A turn about no axis in particular: the tree halves by coordinates and cannot part points that have one in common, like
+/// those of a floor or of a grid.
+fn turn() -> Mat3 {
+    Mat3::from_axis_angle(Vec3::new(0.6, 0.64, -0.48), 1.0)
+}
+
+impl Neighbors {
+    /// Finds `each` neighbours, or all others where there are fewer points; in parts of `stage` from `done.0` to `done.1`.
+    pub(super) fn find(
+        positions: &[Vec3],
+        each: usize,
+        (stage, done): (&str, [f64; 2]),
+        cx: &Context,
+    ) -> Result<Self> {
+        cx.step(stage, done[0])?;
+        let each = each.min(positions.len().saturating_sub(1));
+        let Some(asked) = NonZero::new(each + 1).filter(|_| each > 0) else {
+            return Ok(Self { each: 0, ids: Vec::new() });
+        };
+        let turn = turn();
+        let turned: Vec<[f32; 3]> = positions.par_iter().map(|&p| (turn * p).to_array()).collect();
+        let tree = ImmutableKdTree::<f32, 3>::new_from_slice(&turned);
+        let tree = tree.map_err(|e| Error::input("points", "", e.to_string(), "give fewer"))?;
+        drop(turned);
+        let mut ids = vec![0; each * positions.len()];
+        let finished = AtomicUsize::new(0);
+        ids.par_chunks_mut(each * PART).enumerate().try_for_each(|(part, ids)| {
+            for (row, ids) in ids.chunks_mut(each).enumerate() {
+                let i = part * PART + row;
+                let query = (turn * positions[i]).to_array();
+                let found = tree.query(&query).nearest_n::<SquaredEuclidean<f32>>(asked).execute();
+                let others = found.iter().map(|n| n.item).filter(|&n| n as usize != i);
+                ids.iter_mut().zip(others).for_each(|(id, other)| *id = other);
+            }
+            let finished = finished.fetch_add(ids.len(), Ordering::Relaxed);
+            let part = finished as f64 / (each * positions.len()) as f64;
+            cx.step(stage, done[0] + (done[1] - done[0]) * part)
+        })?;
+        Ok(Self { each, ids })
+    }
+
+    /// How many each point has.
+    pub(super) fn each(&self) -> usize {
+        self.each
+    }
+
+    /// Those of point `i`.
+    pub(super) fn of(&self, i: usize) -> &[u32] {
+        &self.ids[i * self.each..(i + 1) * self.each]
+    }
+}
