@@ -54,7 +54,7 @@ pub(crate) struct SceneArgs {
     pub(crate) place: PlaceArgs,
     /// Surfels over all objects
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SURFELS, allow_negative_numbers = true)]
-    surfels: usize,
+    pub(crate) surfels: usize,
     /// Surfels a tree leaf holds at most (default 8; 122 with --preset paper)
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     leaf: Option<u32>,
@@ -66,8 +66,8 @@ pub(crate) struct SceneArgs {
 /// What stands where, and who looks at it.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlaceArgs {
-    /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply, .stl, .gltf, .glb) to be set beside
-    /// the teapot; one model that has mirrors of its own is a scene as it is
+    /// A built-in scene (default, room, knot), a scene file (.toml), or models or point clouds (.obj, .ply, .stl, .gltf, .glb,
+    /// .las, .laz, .xyz, …) to be set beside the teapot; a file that has mirrors of its own is a scene as it is
     #[arg(value_name = "SCENE|MODEL")]
     pub(crate) inputs: Vec<String>,
     /// Mirror: a mesh file, used as placed, or a built-in shape; repeatable
@@ -119,9 +119,9 @@ pub(crate) struct ReadArgs {
 
 impl ReadArgs {
     /// The rest of a request is as nothing was said.
-    pub(crate) fn request(self) -> Request {
-        let read = ReadOptions { outside: self.allow_outside };
-        Request { up: self.up.map(Into::into), read, ..Request::default() }
+    pub(crate) fn request(self, points: usize, seed: u64) -> Request {
+        let (outside, up) = (self.allow_outside, self.up.map(Into::into));
+        Request { read: ReadOptions { outside, up, points, seed }, ..Request::default() }
     }
 }
 
@@ -208,8 +208,8 @@ impl PlaceArgs {
         begin(self.threads)
     }
 
-    /// The scene that is asked for.
-    pub(crate) fn request(&self) -> Request {
+    /// The scene that is asked for. `points`: of a cloud, at most.
+    pub(crate) fn request(&self, points: usize) -> Request {
         Request {
             inputs: self.inputs.clone(),
             mirrors: self.mirror.clone(),
@@ -219,7 +219,7 @@ impl PlaceArgs {
             eye: self.eye,
             target: self.target,
             fov_y_deg: self.fov,
-            ..self.read.request()
+            ..self.read.request(points, self.seed)
         }
     }
 
@@ -267,7 +267,7 @@ impl SceneArgs {
     pub(crate) fn ready(&self, leaf: Option<u32>, cx: &Context) -> anyhow::Result<Ready> {
         self.begin(cx)?;
         let start = Instant::now();
-        let described = arrange::scene(&self.place.request(), cx)?;
+        let described = arrange::scene(&self.place.request(self.surfels), cx)?;
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
         tell(&described.notes);
         let scene = PreparedScene::new(&described, &self.prepare_options(leaf), cx)?;

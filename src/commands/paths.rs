@@ -30,7 +30,7 @@ use super::{
 #[command(after_long_help = COLUMNS)]
 pub(crate) struct PathsArgs {
     /// A built-in scene (default, room, knot), a scene file (.toml), or models (.obj, .ply, .stl, .gltf, .glb) to be set beside
-    /// the teapot; one model that has mirrors of its own is a scene as it is
+    /// the teapot; a file that has mirrors of its own is a scene as it is
     #[arg(value_name = "SCENE|MODEL")]
     inputs: Vec<String>,
     /// Mirror: a mesh file, used as placed, or a built-in shape; repeatable
@@ -107,7 +107,7 @@ pub(crate) fn run(args: &PathsArgs, cx: &Context) -> anyhow::Result<()> {
         inputs: args.inputs.clone(),
         mirrors: args.mirror.clone(),
         objects: args.object.clone(),
-        ..args.read.request()
+        ..args.read.request(1, 1)
     };
     let mut reader = PointReader::open(&args.points)?;
     let scene = arrange::scene(&request, cx)?;

@@ -100,7 +100,7 @@ pub(crate) fn run(
     };
     let measured = args.frames.is_some() || args.screenshot.is_some();
     let opening = Opening {
-        request: args.scene.place.request(),
+        request: args.scene.place.request(args.scene.surfels),
         prepare: args.scene.prepare_options(leaf),
         side: (chosen || measured).then_some(side),
         size: (said("size") || measured).then_some(args.scene.place.size),

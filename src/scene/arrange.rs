@@ -9,7 +9,7 @@ use super::environment::image::Mounting;
 use super::file::{self, DEFAULT_FOV_Y_DEG, DEFAULT_SKY, PARALLEL, default_light, plain_paint};
 use super::fit::fit;
 use super::library::{Found, Library, stem, unique};
-use super::load::{ReadOptions, UpAxis};
+use super::load::ReadOptions;
 use super::{builtin, load};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -37,22 +37,8 @@ pub struct Request {
     pub target: Option<DVec3>,
     /// Instead of the scene's; vertical, degrees.
     pub fov_y_deg: Option<f64>,
-    /// Which axis of the given models is up; `None`: the usual one of each format.
-    pub up: Option<UpAxis>,
     /// How files are read.
     pub read: ReadOptions,
-}
-
-impl Request {
-    /// What turns a model, as it was read, upright.
-    fn turn(&self, path: &Path) -> DQuat {
-        let read_as = load::usual_up(path);
-        match (self.up.unwrap_or(read_as), read_as) {
-            (UpAxis::Z, UpAxis::Y) => load::Z_TO_Y,
-            (UpAxis::Y, UpAxis::Z) => load::Z_TO_Y.conjugate(),
-            _ => DQuat::IDENTITY,
-        }
-    }
 }
 
 /// As `--proxy`: this mirror has none.
@@ -227,7 +213,7 @@ fn placed(
     let path = Path::new(input);
     if !builtin::SHAPES.contains(&input) && (load::is_model(path) || path.exists()) {
         let found = library.file(path, None)?;
-        let turn = Similarity { rotation: request.turn(path), ..Similarity::IDENTITY };
+        let turn = Similarity { rotation: request.read.turn(path), ..Similarity::IDENTITY };
         let (transform, name) = (found.own().then(&turn), stem(path));
         return Ok(Placed { found, transform, name });
     }

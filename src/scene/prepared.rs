@@ -14,7 +14,9 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
-use super::description::{Environment, EyeDescription, Light, Mirror, Paint, Proxy, Scene, Source};
+use super::description::{
+    Environment, EyeDescription, Light, Mirror, Object, Paint, Proxy, Scene, Source,
+};
 use super::sample;
 use super::sun_map::SunMap;
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
@@ -365,16 +367,47 @@ fn index(n: usize) -> u32 {
     u32::try_from(n).expect("fewer than 2^32 surfels")
 }
 
+/// The surfels of each object: as its points are given, thinned if there are more than its part, or else sampled.
 fn sample_objects(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Result<Vec<Surfels>> {
-    let areas: Vec<f64> =
-        scene.objects.iter().map(|o| o.mesh.area() * o.transform.scale.powi(2)).collect();
-    let densities: Vec<f64> = scene.objects.iter().map(|o| o.density).collect();
-    let counts = sample::allot(&areas, &densities, options.surfels);
-    let mut list = Vec::with_capacity(counts.len());
-    for (object, count) in scene.objects.iter().zip(counts) {
-        list.push(sample::sample(&object.mesh, &object.paint, count, options.seed, cx)?);
+    let mut list = Vec::with_capacity(scene.objects.len());
+    for (object, count) in scene.objects.iter().zip(allot(scene, options.surfels)) {
+        list.push(match &object.points {
+            Some(points) => {
+                let mut own = sample::given::thinned(points, count);
+                sample::given::colored(&mut own, &object.paint);
+                own
+            }
+            None => sample::sample(&object.mesh, &object.paint, count, options.seed, cx)?,
+        });
     }
     Ok(list)
+}
+
+/// Each object's part of the surfels, by area and density. A cloud has no more than its points: the others share the rest.
+fn allot(scene: &Scene, total: usize) -> Vec<usize> {
+    let own_area = |object: &Object| match &object.points {
+        Some(points) => sample::given::area(points),
+        None => object.mesh.area(),
+    };
+    let area = |object: &Object| own_area(object) * object.transform.scale.powi(2);
+    let areas: Vec<f64> = scene.objects.iter().map(area).collect();
+    let mut densities: Vec<f64> = scene.objects.iter().map(|o| o.density).collect();
+    let most =
+        |i: usize| scene.objects[i].points.as_ref().map_or(usize::MAX, |points| points.len());
+    let mut fixed: Vec<Option<usize>> = vec![None; areas.len()];
+    loop {
+        let taken: usize = fixed.iter().flatten().sum();
+        let shares = sample::allot(&areas, &densities, total.saturating_sub(taken));
+        let before = fixed.iter().flatten().count();
+        for i in 0..areas.len() {
+            if fixed[i].is_none() && shares[i] >= most(i) {
+                (fixed[i], densities[i]) = (Some(most(i)), 0.0);
+            }
+        }
+        if fixed.iter().flatten().count() == before {
+            return fixed.iter().zip(shares).map(|(own, share)| own.unwrap_or(share)).collect();
+        }
+    }
 }
 
 /// Surfels of all mirrors together, at most.

@@ -20,6 +20,7 @@
 mod allot;
 mod blocks;
 mod candidates;
+pub mod given;
 mod near;
 mod select;
 

@@ -238,8 +238,7 @@ impl Viewer {
         let inputs = files.iter().map(|f| f.to_string_lossy().into_owned()).collect();
         self.takes_eye = true;
         // What is open stays, and keeps its name, until the other is there.
-        let (up, read) = (self.request.up, self.request.read);
-        let request = Request { inputs, up, read, ..Request::default() };
+        let request = Request { inputs, read: self.request.read, ..Request::default() };
         self.opened = Some(request.clone());
         self.load(What::Request(request), None);
     }

@@ -30,7 +30,7 @@ pub(super) fn equivalent(viewer: &Viewer) -> (String, Option<&'static str>) {
                 word(&mut line, name);
             }
         }
-        if let Some(up) = request.up {
+        if let Some(up) = request.read.up {
             let _ = write!(line, " --up {}", if up == UpAxis::Z { "z" } else { "y" });
         }
         if let Some(panorama) = &request.environment {

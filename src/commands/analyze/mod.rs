@@ -120,7 +120,7 @@ pub(crate) fn run(args: &AnalyzeArgs, cx: &Context) -> anyhow::Result<()> {
 
 fn find(args: &AnalyzeArgs, cx: &Context) -> anyhow::Result<Findings> {
     args.scene.begin(cx)?;
-    let described = arrange::scene(&args.scene.place.request(), cx)?;
+    let described = arrange::scene(&args.scene.place.request(args.scene.surfels), cx)?;
     let scene = PreparedScene::new(&described, &args.scene.prepare_options(None), cx)?;
     let eye = args.scene.place.eye(&scene)?;
     let ray_scale = RayScale::from(args.ray_scale);

@@ -9,6 +9,7 @@ use catoptric::camera::Eye;
 use catoptric::methods::{Method, Params, method};
 use catoptric::scene::arrange::{self, Request};
 use catoptric::scene::description::Scene;
+use catoptric::scene::prepared::DEFAULT_SURFELS;
 use catoptric::scene::prepared::PrepareOptions;
 use catoptric::scene::{PreparedScene, builtin};
 use catoptric::{Context, Error};
@@ -136,11 +137,15 @@ pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
     let place = &bench.args.place;
     let given = !(place.inputs.is_empty() && place.mirror.is_empty() && place.object.is_empty());
     let scenes: Vec<(Scene, usize)> = if given {
-        vec![(arrange::scene(&place.request(), &bench.silent())?, bench.pick(3_000_000, 300_000))]
+        vec![(
+            arrange::scene(&place.request(DEFAULT_SURFELS), &bench.silent())?,
+            bench.pick(3_000_000, 300_000),
+        )]
     } else {
         let counts = bench.pick([3_000_000, 3_000_000, 437_000], [300_000, 300_000, 147_000]);
         let named = |(name, count): (&&str, usize)| {
-            let request = Request { inputs: vec![(*name).to_owned()], ..place.request() };
+            let request =
+                Request { inputs: vec![(*name).to_owned()], ..place.request(DEFAULT_SURFELS) };
             Ok((arrange::scene(&request, &bench.silent())?, count))
         };
         builtin::SCENES.iter().zip(counts).map(named).collect::<catoptric::Result<_>>()?

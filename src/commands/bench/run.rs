@@ -11,6 +11,7 @@ use catoptric::frame::Renderer;
 use catoptric::methods::{Method, Params, method};
 use catoptric::scene::arrange;
 use catoptric::scene::description::{Scene, Source};
+use catoptric::scene::prepared::DEFAULT_SURFELS;
 use catoptric::scene::prepared::{self, PrepareOptions, PreparedScene};
 use catoptric::scene::{builtin, load};
 use catoptric::{Context, Error};
@@ -111,7 +112,7 @@ impl<'a> Bench<'a> {
     /// The scene that is asked for, by default `knot`; given models stand before the teapot alone, without ground, as those
     /// of the paper.
     pub(super) fn described(self) -> catoptric::Result<Scene> {
-        let mut request = self.args.place.request();
+        let mut request = self.args.place.request(DEFAULT_SURFELS);
         if request.inputs.is_empty() && request.mirrors.is_empty() && request.objects.is_empty() {
             request.inputs.push("knot".into());
         }

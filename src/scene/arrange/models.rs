@@ -30,7 +30,7 @@ pub(super) fn scene(request: &Request, library: &mut Library) -> Result<Scene> {
 /// A file that has mirrors of its own, seen by its own camera if it has one.
 fn as_it_is(path: &Path, things: &[(Part, Found)], request: &Request, library: &Library) -> Scene {
     let mut scene = bare(&stem(path));
-    let turn = Similarity { rotation: request.turn(path), ..Similarity::IDENTITY };
+    let turn = Similarity { rotation: request.read.turn(path), ..Similarity::IDENTITY };
     add(&mut scene, path, things, &turn, Vec3::splat(0.7));
     scene.eye = match library.eye(path) {
         Some(eye) => EyeDescription {
@@ -98,7 +98,7 @@ fn beside_teapot(request: &Request, library: &mut Library) -> Result<Scene> {
         let things = library.model(path)?;
         let meshes: Vec<(&Mesh, Similarity)> =
             things.iter().map(|(part, _)| (&*part.mesh, part.own)).collect();
-        let mut transform = fit(&meshes, request.turn(path), OBJECT_DIAGONAL, BESIDE);
+        let mut transform = fit(&meshes, request.read.turn(path), OBJECT_DIAGONAL, BESIDE);
         let placed = |transform: &Similarity| -> Vec<(&Mesh, Similarity)> {
             meshes.iter().map(|(mesh, own)| (*mesh, own.then(transform))).collect()
         };

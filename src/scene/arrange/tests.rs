@@ -183,11 +183,11 @@ fn bad_requests() {
     for (request, wanted) in [
         (
             Request { inputs: strings(["defualt"]), ..none() },
-            "defualt: is neither a built-in scene nor a scene file (.toml) nor a model (.obj, .ply, .stl, .gltf, .glb); the built-in scenes are default",
+            "defualt: is neither a built-in scene nor a scene file (.toml) nor a model (.obj, .ply, .stl, .gltf, .glb, .las, .laz, .xyz, .csv, .txt, .npy); the built-in scenes are default",
         ),
         (
             Request { inputs: strings(["sphere"]), ..none() },
-            "sphere: is neither a built-in scene nor a scene file (.toml) nor a model (.obj, .ply, .stl, .gltf, .glb); use the shape with --mirror or --object",
+            "sphere: is neither a built-in scene nor a scene file (.toml) nor a model (.obj, .ply, .stl, .gltf, .glb, .las, .laz, .xyz, .csv, .txt, .npy); use the shape with --mirror or --object",
         ),
         (Request { inputs: strings(["no.toml"]), ..none() }, "no.toml: does not exist"),
         (Request { inputs: strings(["no.ply"]), ..none() }, "no.ply: does not exist"),

@@ -18,7 +18,7 @@ fn read_back(scene: &Scene) -> Scene {
         &text,
         "written.toml",
         Path::new("elsewhere"),
-        &ReadOptions { outside: true },
+        &ReadOptions { outside: true, ..ReadOptions::default() },
         &Context::default(),
     )
     .unwrap_or_else(|e| panic!("{e}\n{text}"))
@@ -170,8 +170,12 @@ fn arranged_models_come_back() {
         assert_eq!(difference(&scene, &read_back(&scene)), None);
         let saved = folder.path().join("saved.toml");
         write(&scene, &saved).unwrap();
-        let read = super::super::read(&saved, &ReadOptions { outside: true }, &Context::default())
-            .unwrap();
+        let read = super::super::read(
+            &saved,
+            &ReadOptions { outside: true, ..ReadOptions::default() },
+            &Context::default(),
+        )
+        .unwrap();
         assert_eq!(difference(&scene, &read), None);
     }
 }

@@ -5,16 +5,19 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::fs;
+use std::io::Read;
 use std::path::Path;
 
 pub use environment::environment;
 use glam::DQuat;
 
+use super::prepared::DEFAULT_SURFELS;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::MeshDefect;
 pub(super) use crate::image::color::srgb_to_linear as linear_from_srgb;
 
+mod cloud;
 mod environment;
 mod gltf;
 mod model;
@@ -29,8 +32,9 @@ mod textures;
 pub use model::{Model, Part};
 pub use nearby::{Nearby, Unfound};
 
-/// Extensions of the formats that [`model`] reads, in lower case.
-pub const EXTENSIONS: &[&str] = &["obj", "ply", "stl", "gltf", "glb"];
+/// Extensions of the formats that [`model`] reads, in lower case: meshes, then points.
+pub const EXTENSIONS: &[&str] =
+    &["obj", "ply", "stl", "gltf", "glb", "las", "laz", "xyz", "csv", "txt", "npy"];
 
 /// The stage that is reported while a file is read.
 const STAGE: &str = "loading";
@@ -45,15 +49,28 @@ const REPAIR: &str = "repair the file or export it again";
 const READING: u64 = 4;
 
 /// How files are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadOptions {
     /// Files that a file names may lie outside of its folder.
     pub outside: bool,
+    /// Which axis of models is up; `None`: the usual one of each format.
+    pub up: Option<UpAxis>,
+    /// Points of a cloud, at most: a denser one is thinned evenly.
+    pub points: usize,
+    /// Seed of what is random.
+    pub seed: u64,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self { outside: false, up: None, points: DEFAULT_SURFELS, seed: 1 }
+    }
 }
 
 /// Reads a file with all that is in it; the extension, in any case, tells the format.
 ///
-/// Polygons become fans of triangles. Normals and colours are kept where every vertex has them.
+/// Polygons become fans of triangles. Normals and colours are kept where every vertex has them. A file without faces is a cloud
+/// of points.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, holds nothing to be shown or is too large, [`Error::Cancelled`].
@@ -65,6 +82,9 @@ pub fn model(path: &Path, options: &ReadOptions, cx: &Context) -> Result<Model> 
         let remedy = format!("convert it: .{} and .{last} are supported", first.join(", ."));
         return Err(Error::file(path, "", problem, remedy));
     }
+    if is_cloud(path)? {
+        return cloud::read(path, options, cx);
+    }
     let needed = length.saturating_mul(READING);
     cx.room_for(&path.display().to_string(), "its contents", needed)?;
     let model = model_of_bytes(path, &bytes(path)?, options, cx)?;
@@ -72,7 +92,25 @@ pub fn model(path: &Path, options: &ReadOptions, cx: &Context) -> Result<Model> 
     Ok(model)
 }
 
-/// The same for a file's contents. The name tells the format, and where the files lie that it names.
+/// Whether a file has points and no faces.
+fn is_cloud(path: &Path) -> Result<bool> {
+    match extension(path).as_deref() {
+        Some("ply") => {
+            let mut start = Vec::new();
+            let file = fs::File::open(path).map_err(|e| unreadable(path, &e))?;
+            file.take(LONGEST_HEADER).read_to_end(&mut start).map_err(|e| unreadable(path, &e))?;
+            Ok(ply::has_no_faces(path, &start))
+        }
+        Some("obj") => Ok(obj::has_no_faces(&bytes(path)?)),
+        Some("stl" | "gltf" | "glb") => Ok(false),
+        _ => Ok(true),
+    }
+}
+
+/// PLY headers are shorter, bytes.
+const LONGEST_HEADER: u64 = 1 << 16;
+
+/// The same for the contents of a file with a mesh. The name tells the format, and where the files lie that it names.
 ///
 /// # Errors
 /// As [`model`].
@@ -102,11 +140,17 @@ pub enum UpAxis {
 /// Turns +z to +y.
 pub const Z_TO_Y: DQuat = DQuat::from_xyzw(-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2);
 
-/// Which way a file of this kind is read to be up: +y, but for surveys.
-pub fn usual_up(path: &Path) -> UpAxis {
-    match extension(path).as_deref() {
-        Some("las" | "laz") => UpAxis::Z,
-        _ => UpAxis::Y,
+impl ReadOptions {
+    /// What turns the contents of a file upright: +y is up, but in surveys.
+    pub fn turn(&self, path: &Path) -> DQuat {
+        let usual = match extension(path).as_deref() {
+            Some("las" | "laz") => UpAxis::Z,
+            _ => UpAxis::Y,
+        };
+        match self.up.unwrap_or(usual) {
+            UpAxis::Y => DQuat::IDENTITY,
+            UpAxis::Z => Z_TO_Y,
+        }
     }
 }
 

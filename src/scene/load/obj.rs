@@ -72,6 +72,12 @@ pub(super) fn read(path: &Path, bytes: &[u8], outside: bool, cx: &Context) -> Re
     source.paints.paint(path, assembly, outside, cx)
 }
 
+/// Whether there are vertices and no faces.
+pub(super) fn has_no_faces(bytes: &[u8]) -> bool {
+    let counts = Counts::of(bytes);
+    counts.faces == 0 && counts.vertices > 0
+}
+
 /// What a file says of its faces' materials.
 #[derive(Default)]
 struct Paints {

@@ -53,6 +53,13 @@ pub(super) fn read(path: &Path, bytes: &[u8], cx: &Context) -> Result<Mesh> {
     Mesh::new(positions, normals, colors, triangles).map_err(|d| defect(path, d))
 }
 
+/// Whether a file that begins so has vertices and no faces; not if it is none.
+pub(super) fn has_no_faces(path: &Path, start: &[u8]) -> bool {
+    let Ok((header, ..)) = header(path, start) else { return false };
+    let count = |name: &str| header.elements.get(name).map_or(0, |element| element.count);
+    count("vertex") > 0 && count("face") == 0
+}
+
 /// The header, how many lines it has, and what follows it.
 pub(super) fn header<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Header, usize, &'a [u8])> {
     if !bytes.starts_with(b"ply") {

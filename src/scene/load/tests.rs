@@ -90,7 +90,7 @@ fn files_that_are_no_mesh() {
         assert!(complaint(name, b"solid").contains("kind"), "{name}");
     }
     let unknown = load("a.3ds", b"solid").unwrap_err().to_string();
-    assert!(unknown.contains(".obj, .ply, .stl, .gltf and .glb"), "{unknown}");
+    assert!(unknown.contains(".txt and .npy"), "{unknown}");
 }
 
 #[test]

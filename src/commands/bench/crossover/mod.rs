@@ -16,6 +16,7 @@ use catoptric::methods::{Method, Params, method};
 use catoptric::scene::PreparedScene;
 use catoptric::scene::arrange::{self, Request};
 use catoptric::scene::description::Scene;
+use catoptric::scene::prepared::DEFAULT_SURFELS;
 use catoptric::visibility::NONE_ID;
 use serde_json::json;
 
@@ -106,7 +107,7 @@ pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
     let place = &bench.args.place;
     let given = !(place.inputs.is_empty() && place.mirror.is_empty() && place.object.is_empty());
     let built_in = |name: &str| {
-        let request = Request { inputs: vec![name.to_owned()], ..place.request() };
+        let request = Request { inputs: vec![name.to_owned()], ..place.request(DEFAULT_SURFELS) };
         arrange::scene(&request, &bench.silent())
     };
     let scenes = if given {

@@ -78,7 +78,7 @@ fn read_in(folder: &Path, value: &Value, outside: bool) -> Result<Model, String>
     let limit = MemoryLimit { bytes: 1 << 30, taken: || 0 };
     let cx = Context::default().with_memory(Some(limit));
     let bytes = serde_json::to_vec(value).unwrap();
-    let options = ReadOptions { outside };
+    let options = ReadOptions { outside, ..ReadOptions::default() };
     model_of_bytes(&folder.join("a.gltf"), &bytes, &options, &cx).map_err(|e| e.to_string())
 }
 
