@@ -38,13 +38,14 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
     }
     let mut objects = Vec::new();
     for (object, cloud) in scene.objects.iter().zip(&scene.clouds) {
-        let triangles = object.mesh.triangles().len();
+        let triangles = if object.is_cloud { 0 } else { object.mesh.triangles().len() };
         let surfels = cloud.surfels.len();
+        let what = if object.is_cloud { "points".into() } else { format!("{triangles} triangles") };
         let tree = cloud.tree.statistics();
         let b = cloud.bounds;
         let (min, max) = (b.min.as_dvec3() + scene.origin, b.max.as_dvec3() + scene.origin);
         say!(
-            "  object {}: {triangles} triangles, {surfels} surfels; tree: {} leaves of {:.1}, mean depth {:.1}",
+            "  object {}: {what}, {surfels} surfels; tree: {} leaves of {:.1}, mean depth {:.1}",
             object.name,
             tree.leaves,
             tree.points_per_leaf,
@@ -53,6 +54,7 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
         objects.push(json!({
             "name": object.name,
             "triangles": triangles,
+            "is_cloud": object.is_cloud,
             "surfels": surfels,
             "box": { "min": min.to_array(), "max": max.to_array() },
             "tree": {

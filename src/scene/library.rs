@@ -13,6 +13,9 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, Similarity, Surfels};
 
+/// Peak bytes a triangle of a shape while it is made: two corners' worth of vertices, and the indices, twice.
+const TRIANGLE_BYTES: u64 = 150;
+
 /// Makes things and remembers them.
 pub(super) struct Library<'a> {
     pub(super) options: ReadOptions,
@@ -119,6 +122,8 @@ impl<'a> Library<'a> {
         if let Some(found) = self.known.iter().find(|f| f.source == source) {
             return Ok(found.clone());
         }
+        let bytes = TRIANGLE_BYTES.saturating_mul(triangles.unwrap_or(0) as u64);
+        self.cx.room_for(name, &format!("{} triangles", triangles.unwrap_or(0)), bytes)?;
         let mesh = builtin::shape(name, triangles).ok_or_else(|| {
             let problem = format!("there is no built-in shape \"{name}\"");
             unknown(problem, format!("the shapes are {}", builtin::SHAPES.join(", ")))

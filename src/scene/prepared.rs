@@ -111,6 +111,8 @@ pub struct PreparedObject {
     pub name: String,
     /// The mesh as given.
     pub mesh: Arc<Mesh>,
+    /// Whether it was given as points: its mesh only stands for them.
+    pub is_cloud: bool,
     /// Its colour.
     pub paint: Paint,
     /// Object space to scene space.
@@ -278,6 +280,7 @@ impl PreparedScene {
             objects.push(PreparedObject {
                 name: object.name.clone(),
                 mesh: Arc::clone(&object.mesh),
+                is_cloud: object.points.is_some(),
                 paint: object.paint.clone(),
                 to_scene: Similarity::IDENTITY,
                 positions: Vec::new(),
@@ -286,9 +289,12 @@ impl PreparedScene {
             });
             first_triangle += index(object.mesh.triangles().len());
         }
-        let meshes = scene.objects.iter().map(|o| &o.mesh);
-        let meshes = meshes.chain(scene.mirrors.iter().map(|m| &m.mesh));
-        let closed: Vec<bool> = meshes.map(|mesh| mesh.is_closed_outward()).collect();
+        let closed_object = |o: &Object| match &o.points {
+            Some(points) => sample::given::enclose(points),
+            None => o.mesh.is_closed_outward(),
+        };
+        let mirrors = scene.mirrors.iter().map(|m| m.mesh.is_closed_outward());
+        let closed: Vec<bool> = scene.objects.iter().map(closed_object).chain(mirrors).collect();
         let start = Instant::now();
         let count = sampled.len();
         let mut clouds: Vec<Cloud> = Vec::with_capacity(count);

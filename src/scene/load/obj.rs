@@ -188,10 +188,12 @@ impl Paints {
         let mut named: Vec<Named> = Vec::new();
         for library in &self.libraries {
             match nearby.find_loosely(library) {
-                Ok(file) => {
-                    let bytes = super::bytes(&file)?;
-                    named.extend(mtl::read(&file, &bytes, outside, textures, cx)?);
-                }
+                Ok(file) => match super::bytes(&file) {
+                    Ok(bytes) => named.extend(mtl::read(&file, &bytes, outside, textures, cx)?),
+                    Err(error) => {
+                        textures.notes.push(format!("{error}: shown without its materials"));
+                    }
+                },
                 Err(why) => {
                     let error = why.error(&path.display().to_string(), "", library);
                     textures.notes.push(format!("{error}: shown without its materials"));

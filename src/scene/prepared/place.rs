@@ -78,7 +78,8 @@ impl PreparedScene {
                 positions: &object.positions,
                 triangles: object.mesh.triangles(),
                 edges: &object.edges,
-                closed: cloud.closed,
+                // The squares that stand for points do not close.
+                closed: cloud.closed && !object.is_cloud,
             })
             .collect();
         let apart = shade::Sun::new(&self.triangles, &self.light).apart;

@@ -1,6 +1,6 @@
 //! Surfels of things that were given as points: fewer of them, with colours.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::Surfels;
@@ -56,6 +56,25 @@ pub fn colored(surfels: &mut Surfels, paint: &Paint) {
     }
 }
 
+/// Surfels whose normals cancel out to this part of their area, and point out of a volume, enclose it: a scan may lack what
+/// its body stood on (untuned).
+const OPEN: f64 = 0.05;
+
+/// Whether surfels enclose something with outward normals, as closed meshes do.
+pub fn enclose(surfels: &Surfels) -> bool {
+    let middle = (0..surfels.len()).map(|i| surfels.position(i).as_dvec3()).sum::<DVec3>()
+        / surfels.len().max(1) as f64;
+    let (mut sum, mut volume, mut total) = (DVec3::ZERO, 0.0, 0.0);
+    for i in 0..surfels.len() {
+        let area = f64::from(surfels.extent[i]).powi(2);
+        let normal = surfels.normals[i].as_dvec3();
+        sum += normal * area;
+        volume += normal.dot(surfels.position(i).as_dvec3() - middle) * area;
+        total += area;
+    }
+    volume > 0.0 && sum.length() < OPEN * total
+}
+
 /// What surfels stand for together, in the square of their unit.
 pub fn area(surfels: &Surfels) -> f64 {
     let of = |&extent: &f32| f64::from(extent).powi(2) * std::f64::consts::PI;
@@ -65,6 +84,30 @@ pub fn area(surfels: &Surfels) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bodies_enclose_and_sheets_do_not() {
+        let around = |turn: fn(Vec3) -> Vec3| {
+            let at = |i: usize| {
+                let (z, angle) = ((i as f32 + 0.5) / 500.0 - 1.0, i as f32 * 2.399_963);
+                let r = (1.0 - z * z).max(0.0).sqrt();
+                Vec3::new(r * angle.cos(), r * angle.sin(), z) + 9.0
+            };
+            let axis = |k: usize| -> Vec<f32> { (0..1000 + PADDING).map(|i| at(i)[k]).collect() };
+            Surfels {
+                x: axis(0),
+                y: axis(1),
+                z: axis(2),
+                normals: (0..1000).map(|i| turn(at(i) - 9.0)).collect(),
+                albedo: vec![Vec3::ONE; 1000],
+                radiance: vec![Vec3::ZERO; 1000],
+                extent: vec![0.1; 1000],
+            }
+        };
+        assert!(enclose(&around(|n| n)));
+        assert!(!enclose(&around(|n| -n)), "a hollow");
+        assert!(!enclose(&around(|n| if n.z < 0.0 { -n } else { n })), "a sheet over a sheet");
+    }
 
     #[test]
     fn fewer_surfels_cover_the_same_area() {
@@ -90,6 +133,7 @@ mod tests {
         }
         assert_eq!(thinned(&all, 0).len(), 1);
         assert_eq!(thinned(&all, 5000).x, all.x);
+        assert!(!enclose(&all), "a row");
         let mut painted = all;
         colored(&mut painted, &Paint::Constant(Vec3::X));
         assert_eq!(painted.albedo[7], Vec3::X);
