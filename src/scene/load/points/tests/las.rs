@@ -132,21 +132,21 @@ fn what_a_header_promises_is_checked() {
     let put = |bytes: &mut Vec<u8>, at: usize, value: &[u8]| {
         bytes[at..at + value.len()].copy_from_slice(value);
     };
-    let cases: [(&str, u8, bool, usize, Vec<u8>, &str); 8] = [
-        ("signature", 2, false, 0, b"LASX".to_vec(), "has a bad header"),
-        ("points", 2, false, 107, 99_u32.to_le_bytes().to_vec(), "promises 99 points"),
-        ("start", 2, false, 96, u32::MAX.to_le_bytes().to_vec(), "says that its points begin"),
-        ("records", 2, false, 100, u32::MAX.to_le_bytes().to_vec(), "says that its points begin"),
-        ("scale", 2, false, 131, f64::NAN.to_le_bytes().to_vec(), "scales x by NaN"),
-        ("format", 2, false, 104, vec![63], "has a bad header"),
-        ("extended", 7, false, 235, u64::MAX.to_le_bytes().to_vec(), "has no extended record"),
-        ("length", 2, false, 105, 3_u16.to_le_bytes().to_vec(), "has a bad header"),
-    ];
-    for (what, format, compressed, at, value, expected) in cases {
-        let mut bytes = written(format, if format > 5 { 4 } else { 2 }, compressed, 60, Some(9));
+    let number = |v: u32| v.to_le_bytes().to_vec();
+    for (what, format, at, value, expected) in [
+        ("signature", 2, 0, b"LASX".to_vec(), "has a bad header"),
+        ("points", 2, 107, number(99), "promises 99 points"),
+        ("start", 2, 96, number(u32::MAX), "says that its points begin"),
+        ("records", 2, 100, number(u32::MAX), "says that its points begin"),
+        ("scale", 2, 131, f64::NAN.to_le_bytes().to_vec(), "scales x by NaN"),
+        ("format", 2, 104, vec![63], "has a bad header"),
+        ("extended", 7, 235, vec![0xff; 8], "has no extended record"),
+        ("length", 2, 105, vec![3, 0], "has a bad header"),
+    ] {
+        let mut bytes = written(format, if format > 5 { 4 } else { 2 }, false, 60, Some(9));
         put(&mut bytes, at, &value);
         if what == "extended" {
-            put(&mut bytes, 243, &1_u32.to_le_bytes());
+            put(&mut bytes, 243, &number(1));
         }
         let error = read("a.las", &bytes).unwrap_err().to_string();
         assert!(error.contains(expected), "{what}: {error}");
