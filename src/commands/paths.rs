@@ -44,7 +44,8 @@ pub(crate) struct PathsArgs {
     /// Eye position, world space (default: the scene's)
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     eye: Option<DVec3>,
-    /// Points, world space: vertices of .ply or .obj, rows of .xyz, .csv or .txt (three numbers, or columns x, y, z) or .npy
+    /// Points, world space: vertices of .ply or .obj, rows of .xyz, .csv or .txt (three numbers, or columns x, y, z) or .npy,
+    /// records of .las or .laz
     #[arg(long, value_name = "FILE")]
     points: PathBuf,
     /// Table to write: .csv, .npy (structured) or .ply (a cloud of the ghosts); with --count, of the points

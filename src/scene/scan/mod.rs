@@ -115,18 +115,18 @@ fn surfels(mut points: Points, wanted: &CloudOptions, cx: &Context) -> Result<Po
     counts.outliers = points.len() - kept.len();
     if counts.outliers > 0 {
         points.pick(&kept);
+        near.keep(&kept);
     }
     drop(kept);
     let before = points.len();
     let most = wanted.most.max(1);
     if before > most {
+        drop(near);
         let kept = thin::thin(&points.positions, most, wanted.seed, cx)?;
         points.pick(&kept);
-    }
-    counts.thinned = before - points.len();
-    if counts.outliers + counts.thinned > 0 {
         near = Neighbors::find(&points.positions, NEIGHBORS, (NORMALS, [0.0, 0.6]), cx)?;
     }
+    counts.thinned = before - points.len();
     cx.step(NORMALS, 0.6)?;
     let has_normals = normals::complete(&mut points.normals);
     let places = &points.positions;

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::scene::sample::index;
 
 /// For every point the same number of neighbours, nearest first, not itself.
 pub(super) struct Neighbors {
@@ -58,6 +59,32 @@ impl Neighbors {
             cx.step(stage, done[0] + (done[1] - done[0]) * part)
         })?;
         Ok(Self { each, ids })
+    }
+
+    /// Only these points are left, a few less than all: where one of the others was a neighbour, the farthest that is left
+    /// stands for it, or the point itself.
+    pub(super) fn keep(&mut self, kept: &[u32]) {
+        const GONE: u32 = u32::MAX;
+        let mut renamed = vec![GONE; self.ids.len().checked_div(self.each).unwrap_or(0)];
+        for (new, &old) in kept.iter().enumerate() {
+            renamed[old as usize] = index(new);
+            let row = old as usize * self.each;
+            self.ids.copy_within(row..row + self.each, new * self.each);
+        }
+        self.ids.truncate(kept.len() * self.each);
+        let rows = self.ids.par_chunks_mut(self.each.max(1)).enumerate();
+        rows.for_each(|(point, row)| {
+            let mut left = 0;
+            for k in 0..row.len() {
+                let id = renamed[row[k] as usize];
+                if id != GONE {
+                    row[left] = id;
+                    left += 1;
+                }
+            }
+            let last = left.checked_sub(1).map_or(index(point), |last| row[last]);
+            row[left..].fill(last);
+        });
     }
 
     /// How many each point has.

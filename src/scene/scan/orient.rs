@@ -1,5 +1,7 @@
 //! Signs of normals, so that neighbours agree.
 
+use std::cmp::Reverse;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -47,6 +49,22 @@ impl Parts {
     }
 }
 
+impl Parts {
+    /// The parts numbered from zero: that of each point, and whether the point is turned; and how many there are.
+    fn numbered(mut self) -> (Vec<(u32, bool)>, usize) {
+        let mut of: Vec<(u32, bool)> =
+            (0..index(self.parent.len())).map(|i| self.root(i)).collect();
+        let mut count = 0;
+        // A root is the lowest of its part: it has its number before the others ask for it.
+        for i in 0..of.len() {
+            let root = of[i].0 as usize;
+            of[i].0 = if root == i { count } else { of[root].0 };
+            count += u32::from(root == i);
+        }
+        (of, count as usize)
+    }
+}
+
 /// What speaks for it that two normals agree (positive) or that one has to be turned.
 fn vote(from: Vec3, from_normal: Vec3, to: Vec3, to_normal: Vec3) -> i32 {
     let Some(along) = (to - from).try_normalize() else { return 0 };
@@ -72,7 +90,13 @@ struct Link {
     votes: i64,
 }
 
-/// Turns normals so that neighbours agree; returns the connected piece of each point as a point of it.
+/// Turns normals so that neighbours agree; returns the connected piece of each point.
+///
+/// Each point joins the neighbour that is surest about it; parts of the cloud then join the part next to them that they have the
+/// most votes with, all votes along their border added up, until whole pieces remain. So the strongest of many votes decides
+/// between large parts, where the spanning tree of Hoppe et al. (1992) leaves it to the surest pair of points.
+///
+/// `each`: how many neighbours have a vote.
 pub(super) fn orient(
     positions: &[Vec3],
     normals: &mut [Vec3],
@@ -81,74 +105,85 @@ pub(super) fn orient(
     cx: &Context,
 ) -> Result<Vec<u32>> {
     let count = positions.len();
-    let mut parts = Parts::new(count);
     let given = &*normals;
     let vote_of = |i: usize, j: u32| {
         let j = j as usize;
         vote(positions[i], given[i], positions[j], given[j])
     };
-    // The surest neighbour of each.
-    let best = |i: usize| {
-        let surest = |&j: &u32| (vote_of(i, j).abs(), std::cmp::Reverse(j));
-        neighbors.of(i).iter().take(each).copied().max_by_key(surest)
-    };
+    let near = |i: usize| neighbors.of(i).iter().copied().take(each);
+    let best = |i: usize| near(i).max_by_key(|&j| (vote_of(i, j).abs(), Reverse(j)));
     let best: Vec<Option<u32>> = (0..count).into_par_iter().map(best).collect();
+    let mut parts = Parts::new(count);
     for (i, j) in best.into_iter().enumerate() {
         if let Some(j) = j {
             parts.join(index(i), j, vote_of(i, j) < 0);
         }
     }
-    let flat: Vec<(u32, bool)> = (0..index(count)).map(|i| parts.root(i)).collect();
-    let mut links: Vec<Link> = (0..count)
-        .into_par_iter()
-        .flat_map_iter(|i| {
-            let (flat, vote_of) = (&flat, &vote_of);
-            neighbors
-                .of(i)
-                .iter()
-                .take(each)
-                .filter_map(move |&j| link(flat, index(i), j, i64::from(vote_of(i, j))))
-        })
-        .collect();
-    drop(flat);
-    loop {
+    let (mut of_points, part_count) = parts.numbered();
+    let mut links = Vec::new();
+    for start in (0..count).step_by(BLOCK) {
         cx.check()?;
-        add_up(&mut links);
-        if links.is_empty() {
-            break;
-        }
-        let mut surest: Vec<Option<u32>> = vec![None; count];
-        for (k, link) in links.iter().enumerate() {
-            for part in link.parts {
-                let best = &mut surest[part as usize];
-                let is_better = |&b: &u32| links[b as usize].votes.abs() < link.votes.abs();
-                if best.as_ref().is_none_or(is_better) {
-                    *best = Some(index(k));
-                }
-            }
-        }
-        for k in surest.into_iter().flatten() {
-            let Link { parts: [a, b], votes } = links[k as usize];
-            parts.join(a, b, votes < 0);
-        }
-        let flat: Vec<(u32, bool)> = (0..index(count)).map(|i| parts.root(i)).collect();
-        links = links
-            .into_par_iter()
-            .filter_map(|l| link(&flat, l.parts[0], l.parts[1], l.votes))
-            .collect();
+        let block = start..count.min(start + BLOCK);
+        let block = block.into_par_iter().flat_map_iter(|i| {
+            let (of_points, vote_of) = (&of_points, &vote_of);
+            near(i).filter_map(move |j| link(of_points, [index(i), j], i64::from(vote_of(i, j))))
+        });
+        let mut block = block.collect();
+        add_up(&mut block);
+        links.append(&mut block);
     }
-    let roots: Vec<(u32, bool)> = (0..index(count)).map(|i| parts.root(i)).collect();
-    normals.par_iter_mut().zip(&roots).for_each(|(normal, &(_, turned))| {
+    settle(&mut of_points, part_count, links, cx)?;
+    normals.par_iter_mut().zip(&of_points).for_each(|(normal, &(_, turned))| {
         if turned {
             *normal = -*normal;
         }
     });
-    Ok(roots.into_iter().map(|(root, _)| root).collect())
+    Ok(of_points.into_iter().map(|(piece, _)| piece).collect())
 }
 
-/// Votes between two points as votes between their parts; `None` within one.
-fn link(roots: &[(u32, bool)], a: u32, b: u32, votes: i64) -> Option<Link> {
-    let ((a, a_turned), (b, b_turned)) = (roots[a as usize], roots[b as usize]);
+/// Points whose votes are added up at once: those between parts are many, the sums few.
+const BLOCK: usize = 1 << 20;
+
+/// Joins parts until there are no votes between them. `of_items`: the part of whatever they consist of, and whether it is turned.
+fn settle(
+    of_items: &mut [(u32, bool)],
+    parts: usize,
+    mut links: Vec<Link>,
+    cx: &Context,
+) -> Result<()> {
+    cx.check()?;
+    add_up(&mut links);
+    if links.is_empty() {
+        return Ok(());
+    }
+    let mut surest = vec![u32::MAX; parts];
+    for (k, link) in links.iter().enumerate() {
+        for part in link.parts {
+            let best = &mut surest[part as usize];
+            if links.get(*best as usize).is_none_or(|b| b.votes.abs() < link.votes.abs()) {
+                *best = index(k);
+            }
+        }
+    }
+    let mut joined = Parts::new(parts);
+    for k in surest {
+        if let Some(Link { parts: [a, b], votes }) = links.get(k as usize) {
+            joined.join(*a, *b, *votes < 0);
+        }
+    }
+    let (mut of_parts, larger_parts) = joined.numbered();
+    let links = links.into_par_iter().filter_map(|l| link(&of_parts, l.parts, l.votes)).collect();
+    settle(&mut of_parts, larger_parts, links, cx)?;
+    of_items.par_iter_mut().for_each(|(part, turned)| {
+        let (larger, larger_turned) = of_parts[*part as usize];
+        (*part, *turned) = (larger, *turned ^ larger_turned);
+    });
+    Ok(())
+}
+
+/// Votes between two items as votes between their parts; `None` within one.
+fn link(of_items: &[(u32, bool)], items: [u32; 2], votes: i64) -> Option<Link> {
+    let [(a, a_turned), (b, b_turned)] = items.map(|i| of_items[i as usize]);
     let votes = if a_turned ^ b_turned { -votes } else { votes };
     (a != b).then_some(Link { parts: [a.min(b), a.max(b)], votes })
 }

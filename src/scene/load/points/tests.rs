@@ -1,5 +1,8 @@
 use super::*;
 
+mod las;
+mod whole;
+
 const POINTS: [DVec3; 3] =
     [DVec3::new(0.1, -2.0, 3.0), DVec3::new(1e-7, 0.5, -1e6), DVec3::new(4.0, 5.25, 0.0)];
 

@@ -1,6 +1,7 @@
 //! Clouds against closed forms.
 
 mod files;
+mod meshes;
 mod spread;
 mod truth;
 
