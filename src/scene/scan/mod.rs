@@ -16,6 +16,7 @@ mod orient;
 mod outliers;
 mod outward;
 mod spacing;
+mod stage;
 #[cfg(test)]
 mod tests;
 mod thin;
@@ -28,6 +29,7 @@ use rayon::prelude::*;
 pub use self::disks::disks;
 use self::gather::Points;
 use self::neighbors::Neighbors;
+use self::stage::Stage;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::Surfels;
@@ -54,8 +56,9 @@ impl Default for CloudOptions {
 
 /// The most points of one cloud: as many as there may be surfels of one object.
 const MOST: usize = 1 << 28;
-/// Memory that a point of a cloud takes while it becomes a surfel, at most. Measured.
-pub const BYTES_PER_POINT: usize = 300;
+/// Memory that a point of a cloud takes while it becomes a surfel, at most, bytes. Measured with 50 million points: 117 without
+/// normals and colours, which take 12 each, and 12 in addition while they are sorted.
+pub const BYTES_PER_POINT: usize = 200;
 
 /// A cloud as surfels.
 #[derive(Clone, Debug)]
@@ -89,11 +92,12 @@ const CLEANING: &str = "cleaning the cloud";
 const THINNING: &str = "thinning the cloud";
 const NORMALS: &str = "normals of the cloud";
 
-/// Neighbours that a normal is estimated from. Measured on scans and shapes, evenly and randomly sampled, with and without
-/// noise: fewer are better where it is thin and even, more where there is noise.
+/// Neighbours that a normal is estimated from. Measured on scans and shapes of 5,000 to 100,000 points, evenly and randomly
+/// sampled, with and without noise: with 12, half of the normals are off by a tenth more, with 16, twice as many are on the
+/// wrong side.
 const NEIGHBORS: usize = 14;
-/// Those that normals have to agree with.
-const ORIENTED_BY: usize = 8;
+/// Those that normals have to agree with. Measured: from 8 to 12 it makes no difference.
+const ORIENTED_BY: usize = 10;
 
 /// Reads a cloud and makes surfels of it: without duplicates and outliers, at most so many as wanted, with unit normals, and
 /// with extents by how far apart they are.
@@ -108,9 +112,11 @@ pub fn cloud(path: &Path, wanted: &CloudOptions, cx: &Context) -> Result<PointCl
 
 fn surfels(mut points: Points, wanted: &CloudOptions, cx: &Context) -> Result<PointCloud> {
     let mut counts = CloudCounts { read: points.len(), ..CloudCounts::default() };
+    let normals_stage = |from, to| Stage::new(cx, NORMALS, from, to);
     cx.step(CLEANING, 0.0)?;
     counts.duplicates = order::sort_and_dedupe(&mut points);
-    let mut near = Neighbors::find(&points.positions, NEIGHBORS, (CLEANING, [0.1, 1.0]), cx)?;
+    let mut near =
+        Neighbors::find(&points.positions, NEIGHBORS, Stage::new(cx, CLEANING, 0.1, 1.0))?;
     let kept = outliers::keep(&points.positions, &near);
     counts.outliers = points.len() - kept.len();
     if counts.outliers > 0 {
@@ -124,24 +130,21 @@ fn surfels(mut points: Points, wanted: &CloudOptions, cx: &Context) -> Result<Po
         drop(near);
         let kept = thin::thin(&points.positions, most, wanted.seed, cx)?;
         points.pick(&kept);
-        near = Neighbors::find(&points.positions, NEIGHBORS, (NORMALS, [0.0, 0.6]), cx)?;
+        near = Neighbors::find(&points.positions, NEIGHBORS, normals_stage(0.0, 0.4))?;
     }
     counts.thinned = before - points.len();
-    cx.step(NORMALS, 0.6)?;
     let has_normals = normals::complete(&mut points.normals);
     let places = &points.positions;
     let normals = if has_normals {
         points.normals
     } else {
-        let mut normals = normals::estimate(places, &near);
-        cx.step(NORMALS, 0.7)?;
-        let pieces = orient::orient(places, &mut normals, &near, ORIENTED_BY, cx)?;
-        cx.step(NORMALS, 0.9)?;
+        let mut normals = normals::estimate(places, &near, normals_stage(0.4, 0.5))?;
+        let pieces =
+            orient::orient(places, &mut normals, &near, ORIENTED_BY, normals_stage(0.5, 0.75))?;
         outward::outward(places, &mut normals, &near, &pieces, wanted.up);
-        normals::refine(places, &normals, &near)
+        normals::refine(places, &normals, &near, normals_stage(0.75, 0.85))?
     };
-    cx.step(NORMALS, 0.95)?;
-    let extent = spacing::extents(places, &normals, &near);
+    let extent = spacing::extents(places, &normals, &near, normals_stage(0.85, 1.0))?;
     let axis = |axis: usize| {
         let mut list = Vec::with_capacity(places.len() + PADDING);
         list.par_extend(places.par_iter().map(|p| p[axis]));

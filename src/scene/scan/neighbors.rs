@@ -1,13 +1,12 @@
 //! The nearest neighbours of every point.
 
 use std::num::NonZero;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{Mat3, Vec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 
-use crate::context::Context;
+use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::scene::sample::index;
 
@@ -17,9 +16,6 @@ pub(super) struct Neighbors {
     ids: Vec<u32>,
 }
 
-/// Points that are asked for between two looks at the context.
-const PART: usize = 1 << 13;
-
 /// A turn about no axis in particular: the tree halves by coordinates and cannot part points that have one in common, like
 /// those of a floor or of a grid.
 fn turn() -> Mat3 {
@@ -27,14 +23,9 @@ fn turn() -> Mat3 {
 }
 
 impl Neighbors {
-    /// Finds `each` neighbours, or all others where there are fewer points; in parts of `stage` from `done.0` to `done.1`.
-    pub(super) fn find(
-        positions: &[Vec3],
-        each: usize,
-        (stage, done): (&str, [f64; 2]),
-        cx: &Context,
-    ) -> Result<Self> {
-        cx.step(stage, done[0])?;
+    /// Finds `each` neighbours, or all others where there are fewer points.
+    pub(super) fn find(positions: &[Vec3], each: usize, stage: Stage<'_>) -> Result<Self> {
+        stage.step(0.0)?;
         let each = each.min(positions.len().saturating_sub(1));
         let Some(asked) = NonZero::new(each + 1).filter(|_| each > 0) else {
             return Ok(Self { each: 0, ids: Vec::new() });
@@ -45,18 +36,11 @@ impl Neighbors {
         let tree = tree.map_err(|e| Error::input("points", "", e.to_string(), "give fewer"))?;
         drop(turned);
         let mut ids = vec![0; each * positions.len()];
-        let finished = AtomicUsize::new(0);
-        ids.par_chunks_mut(each * PART).enumerate().try_for_each(|(part, ids)| {
-            for (row, ids) in ids.chunks_mut(each).enumerate() {
-                let i = part * PART + row;
-                let query = (turn * positions[i]).to_array();
-                let found = tree.query(&query).nearest_n::<SquaredEuclidean<f32>>(asked).execute();
-                let others = found.iter().map(|n| n.item).filter(|&n| n as usize != i);
-                ids.iter_mut().zip(others).for_each(|(id, other)| *id = other);
-            }
-            let finished = finished.fetch_add(ids.len(), Ordering::Relaxed);
-            let part = finished as f64 / (each * positions.len()) as f64;
-            cx.step(stage, done[0] + (done[1] - done[0]) * part)
+        stage.rows(&mut ids, each, |i, ids| {
+            let query = (turn * positions[i]).to_array();
+            let found = tree.query(&query).nearest_n::<SquaredEuclidean<f32>>(asked).execute();
+            let others = found.iter().map(|n| n.item).filter(|&n| n as usize != i);
+            ids.iter_mut().zip(others).for_each(|(id, other)| *id = other);
         })?;
         Ok(Self { each, ids })
     }

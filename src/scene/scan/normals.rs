@@ -4,9 +4,15 @@ use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::neighbors::Neighbors;
+use super::stage::Stage;
+use crate::error::Result;
 
 /// Fits a plane to each point and its neighbours (Hoppe et al. 1992), the near ones with more weight.
-pub(super) fn estimate(positions: &[Vec3], neighbors: &Neighbors) -> Vec<Vec3> {
+pub(super) fn estimate(
+    positions: &[Vec3],
+    neighbors: &Neighbors,
+    stage: Stage<'_>,
+) -> Result<Vec<Vec3>> {
     let normal = |i: usize| {
         let at = positions[i];
         let near = neighbors.of(i);
@@ -17,11 +23,16 @@ pub(super) fn estimate(positions: &[Vec3], neighbors: &Neighbors) -> Vec<Vec3> {
         });
         flattest(points)
     };
-    (0..positions.len()).into_par_iter().map(normal).collect()
+    stage.map(positions.len(), normal)
 }
 
 /// Fits again, and leaves out neighbours whose normal says that they are on another side of an edge or of a thin sheet.
-pub(super) fn refine(positions: &[Vec3], normals: &[Vec3], neighbors: &Neighbors) -> Vec<Vec3> {
+pub(super) fn refine(
+    positions: &[Vec3],
+    normals: &[Vec3],
+    neighbors: &Neighbors,
+    stage: Stage<'_>,
+) -> Result<Vec<Vec3>> {
     let normal = |i: usize| {
         let (at, own) = (positions[i], normals[i]);
         let near = neighbors.of(i);
@@ -34,7 +45,7 @@ pub(super) fn refine(positions: &[Vec3], normals: &[Vec3], neighbors: &Neighbors
         let found = flattest(points);
         if found.dot(own) < 0.0 { -found } else { found }
     };
-    (0..positions.len()).into_par_iter().map(normal).collect()
+    stage.map(positions.len(), normal)
 }
 
 /// Makes given normals unit; where one has no direction, it becomes that of the next point that has. `false` if there are none,
@@ -59,9 +70,9 @@ pub(super) fn complete(normals: &mut [Vec3]) -> bool {
     true
 }
 
-/// How fast the weight falls as normals part.
+/// How fast the weight falls as normals part. Measured: on scans, from 1 to 4 it makes little difference; 4 keeps sharp edges.
 const ALIKE_POWER: i32 = 4;
-/// Weights reach zero a little beyond the farthest neighbour (squared).
+/// Weights reach zero a little beyond the farthest neighbour (squared). Measured: both 1.05 and 2 are a little worse.
 const BEYOND: f32 = 1.2;
 
 fn reach_squared(positions: &[Vec3], near: &[u32], at: Vec3) -> f32 {

@@ -6,6 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::neighbors::Neighbors;
+use super::stage::Stage;
 use crate::context::Context;
 use crate::error::Result;
 use crate::scene::sample::index;
@@ -79,8 +80,12 @@ fn vote(from: Vec3, from_normal: Vec3, to: Vec3, to_normal: Vec3) -> i32 {
     }
 }
 
-const VOTE_POWER: i32 = 3;
-const ACROSS: f32 = 0.9;
+/// Votes of normals that hardly agree with each other count less by this power. Measured: 1 to 3 are alike, 7 is worse.
+const VOTE_POWER: i32 = 2;
+/// Part of a vote that is lost where the chord runs along a normal: noise puts points of one sheet above each other, and only
+/// where nothing else tells do the two sides of a thin one have a say. Measured: from 0.9 to 0.97 it makes no difference, without
+/// it a part in 200 of noisy points is wrong.
+const ACROSS: f32 = 0.97;
 const SCALE: f32 = (1 << 20) as f32;
 
 /// A pair of parts and the sum of the votes between them.
@@ -102,7 +107,7 @@ pub(super) fn orient(
     normals: &mut [Vec3],
     neighbors: &Neighbors,
     each: usize,
-    cx: &Context,
+    stage: Stage<'_>,
 ) -> Result<Vec<u32>> {
     let count = positions.len();
     let given = &*normals;
@@ -112,7 +117,7 @@ pub(super) fn orient(
     };
     let near = |i: usize| neighbors.of(i).iter().copied().take(each);
     let best = |i: usize| near(i).max_by_key(|&j| (vote_of(i, j).abs(), Reverse(j)));
-    let best: Vec<Option<u32>> = (0..count).into_par_iter().map(best).collect();
+    let best = Stage { to: 0.7 * stage.from + 0.3 * stage.to, ..stage }.map(count, best)?;
     let mut parts = Parts::new(count);
     for (i, j) in best.into_iter().enumerate() {
         if let Some(j) = j {
@@ -122,7 +127,7 @@ pub(super) fn orient(
     let (mut of_points, part_count) = parts.numbered();
     let mut links = Vec::new();
     for start in (0..count).step_by(BLOCK) {
-        cx.check()?;
+        stage.step(0.3 + 0.6 * start as f64 / count as f64)?;
         let block = start..count.min(start + BLOCK);
         let block = block.into_par_iter().flat_map_iter(|i| {
             let (of_points, vote_of) = (&of_points, &vote_of);
@@ -132,7 +137,7 @@ pub(super) fn orient(
         add_up(&mut block);
         links.append(&mut block);
     }
-    settle(&mut of_points, part_count, links, cx)?;
+    settle(&mut of_points, part_count, links, stage.cx)?;
     normals.par_iter_mut().zip(&of_points).for_each(|(normal, &(_, turned))| {
         if turned {
             *normal = -*normal;

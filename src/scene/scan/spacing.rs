@@ -1,9 +1,10 @@
 //! How much of the surface each point stands for.
 
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 
 use super::neighbors::Neighbors;
+use super::stage::Stage;
+use crate::error::Result;
 
 /// Neighbours of a point on a surface that can bound its cell; farther ones hardly ever do.
 const AROUND: usize = 14;
@@ -22,7 +23,12 @@ const MOST: f32 = 1.7;
 
 /// Radii of disks that leave no larger holes between them than those of evenly spread points, each as large as the point's share
 /// of the area at least: that of its cell in the Voronoi diagram of its neighbours, seen along the normal.
-pub(super) fn extents(positions: &[Vec3], normals: &[Vec3], neighbors: &Neighbors) -> Vec<f32> {
+pub(super) fn extents(
+    positions: &[Vec3],
+    normals: &[Vec3],
+    neighbors: &Neighbors,
+    stage: Stage<'_>,
+) -> Result<Vec<f32>> {
     let extent = |i: usize| {
         let near = neighbors.of(i);
         let which = WHICH.min(near.len());
@@ -46,7 +52,7 @@ pub(super) fn extents(positions: &[Vec3], normals: &[Vec3], neighbors: &Neighbor
         let by_cell = (cell.area() / std::f32::consts::PI).sqrt();
         by_cell.min(by_density).max((REACH * cell.reach()).min(MOST * by_density))
     };
-    (0..positions.len()).into_par_iter().map(extent).collect()
+    stage.map(positions.len(), extent)
 }
 
 /// Of a point that has no other.

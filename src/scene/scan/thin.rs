@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::neighbors::Neighbors;
 use super::order::{CODE_BITS, codes};
+use super::stage::Stage;
 use crate::context::Context;
 use crate::error::Result;
 use crate::scene::sample::{hash, index};
@@ -28,7 +29,7 @@ pub(super) fn thin(positions: &[Vec3], most: usize, seed: u64, cx: &Context) -> 
     }
     let chosen = one_a_cell(positions, most.saturating_mul(CANDIDATES), seed);
     let places: Vec<Vec3> = chosen.par_iter().map(|&i| positions[i as usize]).collect();
-    let neighbors = Neighbors::find(&places, NEIGHBORS, (super::THINNING, [0.0, 0.7]), cx)?;
+    let neighbors = Neighbors::find(&places, NEIGHBORS, Stage::new(cx, super::THINNING, 0.0, 0.7))?;
     let thrower = Thrower { places: &places, neighbors: &neighbors, seed };
     let kept = thrower.search(most, cx)?;
     Ok(kept.into_iter().map(|k| chosen[k as usize]).collect())

@@ -69,7 +69,8 @@ fn squares_leave_few_holes_however_many_there_are() {
 #[test]
 fn neighbours_that_go_are_replaced_by_those_that_stay() {
     let line: Vec<Vec3> = (0..10_u8).map(|i| Vec3::X * f32::from(i).powf(1.1)).collect();
-    let mut near = Neighbors::find(&line, 3, ("x", [0.0, 1.0]), &Context::default()).unwrap();
+    let mut near =
+        Neighbors::find(&line, 3, Stage::new(&Context::default(), "x", 0.0, 1.0)).unwrap();
     assert_eq!((near.of(0), near.of(9)), (&[1, 2, 3][..], &[8, 7, 6][..]));
     near.keep(&[0, 3, 4, 5, 9]);
     // Of 1, 2 and 3 only 3 is left, and it is called 1 now; of 8, 7 and 6 nothing is.
