@@ -178,11 +178,8 @@ fn splat_of(job: Job, image: Image) -> Splat {
         let deviation = row(frame.deviations + own.y + at.y * s.size.x + at.x).xyz;
         s.middle += correction(steps, deviation * (image.lambda / radius));
     }
-    var size = 1.0 / f32(job.stride);
-    if job.stride == 1u && job.surfel >= plan[camera + IDS].y {
-        let share = row(camera + E1).w / surfel_extent[job.surfel];
-        size = share * share;
-    }
+    let share = row(camera + E1).w / surfel_extent[job.surfel];
+    let size = share * share / f32(job.stride);
     if ELLIPSE {
         let on = on_surface(camera, steps, d, normal_of(camera, job.surfel));
         if !on.facing {

@@ -11,6 +11,7 @@ mod environments;
 mod gpu;
 mod interrupt;
 mod methods;
+mod models;
 mod paths;
 mod runs;
 mod same_bytes;
@@ -91,6 +92,14 @@ impl Folder {
         assert_eq!((run.code, run.err.as_str()), (Some(0), ""), "{}", run.line);
         assert!(!self.litter(), "{}: {:?}", run.line, self.listing());
         run
+    }
+
+    /// Runs a line that must succeed, with no more than notes on standard error. What it says, and the notes.
+    fn ok(&self, line: &str) -> (String, String) {
+        let run = self.run(line);
+        assert_eq!(run.code, Some(0), "{}: {}", run.line, run.err);
+        assert!(run.err.lines().all(|l| l.starts_with("note: ")), "{}: {}", run.line, run.err);
+        (run.out, run.err)
     }
 
     /// Whether a file is left that was only meant to be there for a moment.

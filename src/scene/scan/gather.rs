@@ -35,11 +35,19 @@ pub(super) fn read(path: &Path, most: usize, cx: &Context) -> Result<Points> {
     let layout = reader.layout();
     let mut positions = Vec::new();
     let (mut normals, mut colors) = (Vec::new(), Vec::new());
+    let mut asked = 0;
     loop {
         cx.step("loading", reader.done())?;
         let part = reader.read_whole(PART)?;
         if part.is_empty() {
             break;
+        }
+        if positions.len() + part.len() > asked {
+            // An eighth more is read before the question is asked again.
+            asked = (positions.len() + part.len()) / 8 * 9;
+            let all = (asked as u64).saturating_mul(super::BYTES_PER_POINT as u64);
+            let bytes = all - size_of_val(&positions[..]) as u64;
+            cx.room_for(&path.display().to_string(), &format!("{asked} points"), bytes)?;
         }
         if positions.len() + part.len() > most {
             let problem = format!("has more than {most} points");

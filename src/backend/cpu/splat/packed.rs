@@ -106,28 +106,26 @@ impl Packed {
                     let values: f32x16<S> = Vector::load(simd, &from[next..]);
                     Vector::store(values, &mut to[at..]);
                 }
-                let size = if first >= camera.representatives {
-                    let extent: f32x16<S> = Vector::load(simd, &surfels.extent[next..]);
-                    let share = Real::splat(one, camera.extent) / extent;
-                    share * share
-                } else {
-                    one
-                };
-                Vector::store(size, &mut self.size[at..]);
+                let extent: f32x16<S> = Vector::load(simd, &surfels.extent[next..]);
+                let share = Real::splat(one, camera.extent) / extent;
+                Vector::store(share * share, &mut self.size[at..]);
                 for (to, surfel) in
                     self.surfel[at..at + COPIED as usize].iter_mut().zip(first + done..)
                 {
                     *to = surfel;
                 }
             } else {
-                let size = one * (1.0 / batch.stride as f32);
-                Vector::store(size, &mut self.size[at..]);
+                let each = 1.0 / batch.stride as f32;
+                // The lanes beyond are to hold some size, too.
+                Vector::store(one * each, &mut self.size[at..]);
                 for k in 0..some {
                     let surfel = first + (done + k) * batch.stride;
                     let (to, i) = (at + k as usize, surfel as usize);
                     self.x[to] = surfels.x[i];
                     self.y[to] = surfels.y[i];
                     self.z[to] = surfels.z[i];
+                    let share = camera.extent / surfels.extent[i];
+                    self.size[to] = share * share * each;
                     self.surfel[to] = surfel;
                 }
             }

@@ -169,15 +169,8 @@ fn by_hand<T: Scalar + Real<Scalar = T, Mask = bool>>(
     let steep = if facing < least { along * T::from_f64(least / facing) } else { along };
     let on = |step: [T; 3]| minus(step, scaled(d, dot(normal, step) / steep));
     let (right, down) = (on(right), on(down));
-    let representative = surfel >= c.representatives as usize;
-    let size = if drawn.stride > 1.0 {
-        1.0 / drawn.stride
-    } else if representative {
-        (f64::from(c.extent) / f64::from(scene.surfels.extent[surfel])).powi(2)
-    } else {
-        1.0
-    };
-    let size = T::from_f64(size);
+    let share = f64::from(c.extent) / f64::from(scene.surfels.extent[surfel]);
+    let size = T::from_f64(share.powi(2) / drawn.stride);
     let (a, b, e) = (dot(right, right) * size, dot(right, down) * size, dot(down, down) * size);
     // The disk's ellipse, no longer than the largest, wider by SPREAD, and the pixel's.
     let limit = T::from_f64(f64::from(LARGEST_ELLIPSE).powi(-2));
