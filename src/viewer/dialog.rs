@@ -6,6 +6,7 @@ use std::sync::mpsc::Sender;
 use eframe::egui;
 
 use super::app::Chosen;
+use crate::scene::load;
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +26,7 @@ pub(super) fn ask(kind: Kind, to: Sender<Chosen>, context: &egui::Context) {
         Kind::Open => {
             let dialog = dialog
                 .set_title("Open a scene or models")
-                .add_filter("scenes and models", &["toml", "obj", "ply"]);
+                .add_filter("scenes and models", &[&["toml"], load::EXTENSIONS].concat());
             let waiting = dialog.pick_files();
             wait(context, to, async move {
                 let files = waiting.await?;

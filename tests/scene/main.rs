@@ -4,6 +4,8 @@
 #![expect(clippy::unwrap_used, reason = "a test fails where it panics")]
 
 mod cells;
+#[cfg(feature = "cli")]
+mod clouds;
 mod detail;
 mod hiding;
 mod holes;

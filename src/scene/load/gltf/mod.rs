@@ -24,6 +24,7 @@ use crate::scene::library::unique;
 
 mod accessor;
 mod buffers;
+mod check;
 mod materials;
 
 /// As many nodes stay things of their own; more of them become one, which is culled faster.
@@ -33,7 +34,8 @@ const VERTEX_BYTES: u64 = 160;
 
 /// Reads a glTF or GLB file.
 pub(super) fn read(path: &Path, bytes: &[u8], outside: bool, cx: &Context) -> Result<Model> {
-    let mut file = Gltf::from_slice(bytes).map_err(|e| unreadable(path, &e))?;
+    let mut file = Gltf::from_slice_without_validation(bytes).map_err(|e| unreadable(path, &e))?;
+    check::check(path, file.as_json())?;
     let nearby = Nearby::of(path, outside);
     let buffers = buffers::read(path, &mut file, nearby, cx)?;
     let numbers = Numbers { path, buffers: &buffers, cx };
@@ -109,20 +111,13 @@ fn parts(
 }
 
 fn unreadable(path: &Path, error: &gltf::Error) -> Error {
-    use gltf::json::validation::Error as Invalid;
-    if let gltf::Error::Validation(list) = error {
-        let Some((place, what)) = list.first() else {
-            return Error::file(path, "", "is not valid glTF", REPAIR);
-        };
-        let place = place.to_string();
-        if place.contains("extensionsRequired") && matches!(what, Invalid::Unsupported) {
-            let remedy = "export it without compression or other required extensions";
-            let problem = "needs an extension that is not supported";
-            return Error::file(path, place, problem, remedy);
-        }
-        return Error::file(path, place, format!("is not valid glTF: {what}"), REPAIR);
-    }
+    let error = one_line(&error.to_string());
     Error::file(path, "", format!("is not a glTF file that can be read: {error}"), GET_IT_AGAIN)
+}
+
+/// What others say, as part of a message of one line.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().take(40).collect::<Vec<_>>().join(" ")
 }
 
 type Placed<'a> = (gltf::Node<'a>, DMat4);

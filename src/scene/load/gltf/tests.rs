@@ -204,6 +204,9 @@ fn what_is_wrong_is_named() {
         ("/buffers/0/byteLength", json!(109), "buffer 0: has 108 bytes, but the file promises 109"),
         ("/buffers/0/uri", json!("data:x;base64,?"), "buffer 0: has data that is not base64"),
         ("/nodes/1/mesh", json!(7), "is not valid glTF"),
+        ("/meshes/0/primitives/0/attributes/POSITION", json!(9), "names an accessor that"),
+        ("/images/0", json!({}), "images[0]: has neither data nor a name"),
+        ("/images/0", json!({ "bufferView": 0 }), "images[0]: has no mimeType"),
     ] {
         let found = match path {
             "/accessors/0/byteOffset" | "/bufferViews/1/byteStride" => complaint(&|value| {
