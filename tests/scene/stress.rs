@@ -498,8 +498,8 @@ fn the_eye_on_a_vertex() {
         for (way, _, planes) in &all {
             let share = other_objects(truth, planes);
             assert_eq!(planes.mirror, truth.mirror, "{name}, {way:?}");
-            // Among single pixels of hidden surfels some are left open.
-            let most = if way.splat == Splat::Square(1.0) { 0.05 } else { 0.02 };
+            // Squares of the mirror's surfels leave some pixels open: they are few.
+            let most = if way.splat == Splat::Disk { 0.02 } else { 0.06 };
             let hides = !way.settings.contains(&("mirror-occlusion", "off"));
             if way.method == "c3rc" && hides && share >= most {
                 wrong += &format!("{name}, {way:?}: {share}\n");
