@@ -52,7 +52,7 @@ pub struct CameraInstance {
     pub footprint: [[f32; 3]; 3],
     /// How far outside the triangle images are drawn, by weight.
     pub guard: [f32; 3],
-    /// Positive where the ray leaves the mirror on its front side, linear in (b2, b3).
+    /// Positive where the ray leaves the mirror on the side that is seen, linear in (b2, b3).
     pub front: [f32; 3],
     /// v(w) - eye in scene space by coordinate, linear in (b2, b3): for push-back depth.
     pub from_eye: [[f32; 3]; 3],

@@ -88,6 +88,21 @@ impl MirrorTriangle {
         })
     }
 
+    /// Whether the flat triangle is seen on the side that its normals do not point to: an open mirror's back, a closed one from
+    /// within, or any with normals that point inwards.
+    pub fn is_seen_from_behind(&self, eye: Vec3) -> bool {
+        let [a, b, c] = self.corners.map(|corner| corner.as_dvec3());
+        let flat = (b - a).cross(c - a);
+        let outward = flat.dot(interpolate(self.normals, [1.0; 3]));
+        flat.dot(eye.as_dvec3() - a) * outward.signum() < 0.0
+    }
+
+    /// [`Self::facing`] of the side that is seen: rays reflect alike on both.
+    pub fn facing_seen(&self, eye: Vec3) -> [f64; 3] {
+        let facing = self.facing(eye);
+        if self.is_seen_from_behind(eye) { facing.map(|f| -f) } else { facing }
+    }
+
     /// The direction `Σ w_i d_i` of the 3-ray camera's own ray at the point with these weights; not unit.
     pub fn camera_direction(&self, eye: Vec3, weights: [f64; 3], scale: RayScale) -> DVec3 {
         let d = self.corner_directions(eye, scale);
@@ -129,6 +144,26 @@ mod tests {
     use super::*;
 
     const EYE: Vec3 = Vec3::new(0.3, 2.0, -0.5);
+
+    #[test]
+    fn the_side_that_is_seen_faces() {
+        let mirror = curved();
+        let other = MirrorTriangle { normals: mirror.normals.map(|n| -n), ..mirror };
+        let turned = [mirror.corners[0], mirror.corners[2], mirror.corners[1]];
+        let turned = MirrorTriangle {
+            corners: turned,
+            normals: [mirror.normals[0], mirror.normals[2], mirror.normals[1]],
+        };
+        let below = Vec3::new(EYE.x, -EYE.y, EYE.z);
+        for (mirror, above) in [(mirror, true), (other, false), (turned, true)] {
+            for (eye, seen) in [(EYE, !above), (below, above)] {
+                assert_eq!(mirror.is_seen_from_behind(eye), seen, "{mirror:?}");
+                assert!(mirror.facing_seen(eye).iter().all(|f| *f > 0.0), "{mirror:?}");
+            }
+        }
+        let flat = MirrorTriangle { corners: [Vec3::ZERO; 3], ..mirror };
+        assert!(!flat.is_seen_from_behind(EYE));
+    }
 
     fn curved() -> MirrorTriangle {
         let corners = [Vec3::ZERO, Vec3::new(1.0, 0.1, 0.0), Vec3::new(0.2, -0.1, 1.0)];

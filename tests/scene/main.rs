@@ -15,6 +15,7 @@ mod plane_mirror;
 mod plans;
 mod roots;
 mod searches;
+mod stress;
 
 use std::sync::Arc;
 

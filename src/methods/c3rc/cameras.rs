@@ -87,7 +87,7 @@ pub(super) fn starts(cameras: &[CameraInstance], patches: usize) -> Vec<u32> {
 pub(super) struct View<'a> {
     pub(super) patch: &'a Patch,
     pub(super) rays: Rays,
-    /// Positive where a corner's ray leaves the mirror on its front side.
+    /// Positive where a corner's ray leaves the mirror on the side that is seen.
     pub(super) front: [f64; 3],
     /// Of a cell: what holds its pixels, and how far beyond it its rays may be continued, in pixels.
     pub(super) outline: Option<(Outline, DVec2)>,
@@ -100,7 +100,7 @@ fn of_triangle<'a>(frame: FrameInput<'_>, patch: &'a Patch, scale: RayScale) -> 
         origins: mirror.corners.map(|v| v.as_dvec3()),
         directions: mirror.corner_directions(position, scale),
     };
-    let facing = DVec3::from_array(mirror.facing(position));
+    let facing = DVec3::from_array(mirror.facing_seen(position));
     let front = patch.corners.map(|w| w.dot(facing));
     View { patch, rays: whole.part(patch.corners), front, outline: None }
 }
@@ -248,7 +248,7 @@ pub(super) fn of_view(
             }
             let range_f64 = range.map(f64::from);
             let radius = f64::from(EVENNESS) * to_scene.scale * f64::from(cloud.extent);
-            let (screen, guard, footprint) = exact.get_or_insert_with(|| {
+            let (screen, guard, footprint, leaves) = exact.get_or_insert_with(|| {
                 let screen = screen_forms(eye, patch, rays.origins);
                 let guard = match outline {
                     Some(_) => None,
@@ -256,7 +256,9 @@ pub(super) fn of_view(
                 };
                 let before = corners_px.iter().all(|c| c.z > 0.0);
                 let px = |c: DVec3| if before { c.truncate() / c.z } else { DVec2::NAN };
-                (screen, guard, Footprint::new(&corners_px.map(px), rays))
+                let mirror = scene.mirror_triangle(patch.triangle.0);
+                let leaves = !mirror.is_seen_from_behind(eye.position);
+                (screen, guard, Footprint::new(&corners_px.map(px), rays), leaves)
             });
             let detail = match outline {
                 Some(_) => settings.detail,
@@ -301,7 +303,7 @@ pub(super) fn of_view(
                 screen: *screen,
                 per_px: [footprint.base, footprint.per_lambda]
                     .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / radius))),
-                gaze: gaze(cloud, &own_grown, hides),
+                gaze: gaze(cloud, &own_grown, hides && *leaves),
                 representatives: cloud.representatives.start,
                 detail: detail as f32,
                 radius: radius as f32,

@@ -148,7 +148,7 @@ impl Kernel<'_> {
         (rays, hits, rays_ms)
     }
 
-    /// The camera model sends no ray from where the smooth surface is seen from behind.
+    /// The camera model sends no ray from where the smooth surface is not seen on the side of its flat triangle.
     fn cut_back_sides(
         &self,
         samples: &[PictureSample],
@@ -160,7 +160,7 @@ impl Kernel<'_> {
             let Some(mirror) = mirrors.get(sample.mirror_triangle as usize) else { return };
             let origin = eye.position.as_dvec3();
             let direction = eye.ray_through_px(sample.px).as_dvec3();
-            let facing = mirror.facing(eye.position);
+            let facing = mirror.facing_seen(eye.position);
             let front = weights_on_line(origin, direction, mirror.corners)
                 .is_some_and(|w| (0..3).map(|i| w[i] * facing[i]).sum::<f64>() > 0.0);
             if !front {
