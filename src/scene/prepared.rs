@@ -17,8 +17,8 @@ use glam::{DVec3, Vec3};
 use super::description::{
     Environment, EyeDescription, Light, Mirror, Object, Paint, Proxy, Scene, Source,
 };
-use super::sample;
 use super::sun_map::SunMap;
+use super::{sample, shade};
 use crate::accel::{KdTree, KdTreeLimits, TriangleBvh};
 use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
@@ -113,6 +113,10 @@ pub struct PreparedObject {
     pub mesh: Arc<Mesh>,
     /// Whether it was given as points: its mesh only stands for them.
     pub is_cloud: bool,
+    /// Detail smaller than this casts no shadow on it, scene units: 0, but for a cloud of points.
+    pub detail: f32,
+    /// The same in its own space.
+    own_detail: f32,
     /// Its colour.
     pub paint: Paint,
     /// Object space to scene space.
@@ -281,6 +285,10 @@ impl PreparedScene {
                 name: object.name.clone(),
                 mesh: Arc::clone(&object.mesh),
                 is_cloud: object.points.is_some(),
+                detail: 0.0,
+                own_detail: object.points.as_ref().map_or(0.0, |points| {
+                    shade::CLOUD_ROUGHNESS * sample::given::mean_extent(points)
+                }),
                 paint: object.paint.clone(),
                 to_scene: Similarity::IDENTITY,
                 positions: Vec::new(),

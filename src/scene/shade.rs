@@ -24,7 +24,8 @@ pub fn shade(albedo: Vec3, normal: Vec3, sun_visible: bool, light: &Light) -> Ve
 const BLOCK: usize = 64 * CHUNK;
 
 /// Sets the radiance of the surfels in `range`, which belong to an object that `to_scene` takes to scene space,
-/// with `occluders` between them and the sun. Fastest if surfels that follow each other are close.
+/// with `occluders` between them and the sun. Detail that is smaller than `roughness` times a surfel casts no shadow on it: 1,
+/// but [`CLOUD_ROUGHNESS`] for a cloud of points. Fastest if surfels that follow each other are close.
 ///
 /// # Errors
 /// [`crate::Error::Cancelled`].
@@ -35,6 +36,7 @@ pub fn bake(
     surfels: &mut Surfels,
     range: Range<usize>,
     to_scene: &Similarity,
+    roughness: f32,
     occluders: &TriangleBvh,
     light: &Light,
     cx: &Context,
@@ -51,7 +53,7 @@ pub fn bake(
                 .map(|i| SurfacePoint {
                     position: place(to_scene, Vec3::new(x[i], y[i], z[i])),
                     normal: to_scene.direction(normals[i].as_dvec3()).as_vec3(),
-                    extent: extent[i] * scale_of(to_scene),
+                    extent: extent[i] * roughness * scale_of(to_scene),
                 })
                 .collect();
             for ((i, radiance), visible) in (first..).zip(radiance).zip(sun.visible(&points)) {
@@ -69,6 +71,13 @@ fn place(to_scene: &Similarity, point: Vec3) -> Vec3 {
 #[expect(clippy::cast_possible_truncation, reason = "lengths are f32 everywhere")]
 fn scale_of(to_scene: &Similarity) -> f32 {
     to_scene.scale as f32
+}
+
+impl SurfacePoint {
+    /// Where shadows are asked for, as far as its own extent says.
+    pub fn lifted(&self) -> Vec3 {
+        self.position + self.normal * (LIFT * self.extent)
+    }
 }
 
 /// A point of a surface, as the shadow rays need it.
@@ -92,6 +101,10 @@ pub struct Sun<'a> {
 
 /// Rounding of positions in units of the scene's size, with a margin of ten.
 const APART: f32 = 2e-6;
+
+/// The squares that stand for points overlap each other: where their normals are estimated, up to about an extent
+/// off the surface (looked at on scans).
+pub const CLOUD_ROUGHNESS: f32 = 1.0 / LIFT;
 
 /// Shadow rays start this part of a surfel's extent off the surface: detail finer than a surfel casts none.
 const LIFT: f32 = 0.1;

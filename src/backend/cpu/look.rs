@@ -39,8 +39,9 @@ impl<'a> Look<'a> {
     /// Whether the sun lights a point of an object, by rays.
     #[inline(always)]
     fn sees_sun(&self, hit: &Hit) -> bool {
-        let normal = self.scene.objects[hit.object].normal(hit.triangle, hit.weights);
-        self.sun.visible_from(&SurfacePoint { position: hit.point, normal, extent: 0.0 })
+        let object = &self.scene.objects[hit.object];
+        let normal = object.normal(hit.triangle, hit.weights);
+        self.sun.visible_from(&SurfacePoint { position: hit.point, normal, extent: object.detail })
     }
 
     /// What is seen of a channel of a reflectance.
@@ -156,7 +157,16 @@ impl Appearance for Look<'_> {
         object.mesh.triangles()[triangle].map(|corner| {
             let corner = corner as usize;
             let normal = object.mesh.normals()[corner];
-            let place = axes.map(|axis| axis.dot(object.positions[corner]));
+            let position = match object.is_cloud {
+                false => object.positions[corner],
+                true => SurfacePoint {
+                    position: object.positions[corner],
+                    normal: object.to_scene.direction(normal.as_dvec3()).as_vec3(),
+                    extent: object.detail,
+                }
+                .lifted(),
+            };
+            let place = axes.map(|axis| axis.dot(position));
             let paint = match &object.paint {
                 Paint::Pattern { period, .. } => object.mesh.positions()[corner] / *period,
                 Paint::Vertex | Paint::Materials(_) => {

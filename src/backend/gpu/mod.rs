@@ -236,9 +236,10 @@ impl Backend for Gpu {
         picture: &mut Picture,
     ) {
         let composes = self.options.composes;
-        // The shaders know no textures yet.
-        let textured = scene.objects.iter().any(|o| matches!(o.paint, Paint::Materials(_)));
-        let composes = |r: &&mut Ready| composes.unwrap_or(!r.gpu.software) && !textured;
+        // The shaders know neither textures nor clouds of points yet.
+        let knows =
+            scene.objects.iter().all(|o| !o.is_cloud && !matches!(o.paint, Paint::Materials(_)));
+        let composes = |r: &&mut Ready| knows && composes.unwrap_or(!r.gpu.software);
         let ready = self.ready.as_mut().filter(composes);
         let done = ready.map(|r| r.compose(scene, eye, visibility, reflection, white, picture));
         if !matches!(done, Some(Ok(()))) {

@@ -186,7 +186,7 @@ impl Kernel<'_> {
                 let (object, triangle) = scene.object_of_triangle(hit.triangle);
                 let object = &scene.objects[object];
                 let normal = object.normal(triangle, hit.barycentrics);
-                let point = SurfacePoint { position: ray.at(hit.t), normal, extent: 0.0 };
+                let point = SurfacePoint { position: ray.at(hit.t), normal, extent: object.detail };
                 let albedo = object.albedo(triangle, hit.barycentrics);
                 sum.radiance += shade(albedo, normal, sun.visible_from(&point), &scene.light);
                 sum.hits += 1;

@@ -67,9 +67,10 @@ impl PreparedScene {
         let (object, triangle) = self.object_of_triangle(triangle);
         let albedo = self.objects[object].albedo(triangle, weights);
         let facing = normal.dot(self.light.to_sun);
-        let by_ray = || sun.visible_from(&SurfacePoint { position, normal, extent: 0.0 });
-        let lit =
-            facing > 0.0 && self.sun_map.lights_point(position, facing).unwrap_or_else(by_ray);
+        let point = SurfacePoint { position, normal, extent: self.objects[object].detail };
+        let by_ray = || sun.visible_from(&point);
+        let lit = facing > 0.0
+            && self.sun_map.lights_point(point.lifted(), facing).unwrap_or_else(by_ray);
         shade(albedo, normal, lit, &self.light)
     }
 }

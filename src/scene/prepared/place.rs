@@ -18,6 +18,7 @@ impl PreparedScene {
         let to_scene = from_origin(transform, self.origin);
         self.clouds[object].place(to_scene);
         let object = &mut self.objects[object];
+        object.detail = object.own_detail * narrow(to_scene.scale);
         object.to_scene = to_scene;
         object.positions = to_scene_positions(&object.mesh, &to_scene);
     }
@@ -56,12 +57,14 @@ impl PreparedScene {
     pub fn shade(&mut self, cx: &Context) -> Result<()> {
         self.triangles = bvh(self.objects.iter().map(|o| (&*o.mesh, &o.positions[..])));
         self.sun_map = self.map_shadows();
-        for cloud in &self.clouds[..self.objects.len()] {
+        for (cloud, object) in self.clouds.iter().zip(&self.objects) {
+            let roughness = if object.is_cloud { shade::CLOUD_ROUGHNESS } else { 1.0 };
             let range = cloud.surfels.start as usize..cloud.surfels.end as usize;
             shade::bake(
                 &mut self.surfels,
                 range,
                 &cloud.to_scene,
+                roughness,
                 &self.triangles,
                 &self.light,
                 cx,
@@ -104,6 +107,11 @@ impl Cloud {
         self.bounds = Aabb { min: bounds.min - slack, max: bounds.max + slack };
         self.to_scene = to_scene;
     }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "lengths are f32 everywhere")]
+fn narrow(x: f64) -> f32 {
+    x as f32
 }
 
 /// Of meshes with their positions in scene space.

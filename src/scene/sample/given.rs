@@ -81,6 +81,14 @@ pub fn area(surfels: &Surfels) -> f64 {
     surfels.extent[..surfels.len()].iter().map(of).sum()
 }
 
+/// The extent of surfels that are all alike and stand for as much.
+pub fn mean_extent(surfels: &Surfels) -> f32 {
+    let each = area(surfels) / std::f64::consts::PI / surfels.len().max(1) as f64;
+    #[expect(clippy::cast_possible_truncation, reason = "rounded")]
+    let extent = each.sqrt() as f32;
+    extent
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
