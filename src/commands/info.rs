@@ -85,6 +85,7 @@ pub(crate) fn run(args: &InfoArgs, cx: &Context) -> anyhow::Result<()> {
     );
     let value = json!({
         "scene": scene.name,
+        "notes": ready.described.notes,
         "surfels": scene.surfel_count(),
         "mirrors": mirrors,
         "objects": objects,

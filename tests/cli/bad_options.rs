@@ -96,7 +96,7 @@ fn more_than_the_memory_holds() {
     let total = memory.lines().next().unwrap().split_whitespace().nth(1).unwrap();
     if total.parse::<u64>().unwrap() < 200_000_000 {
         let line = "render --surfels 2147483647 --size 16x9";
-        folder.refused(line, &["--surfels: 2147483647 surfels need 279.2 GB of memory"]);
+        folder.refused(line, &["--surfels: 2147483647 surfels need about 279.17 GB of memory"]);
     }
 }
 

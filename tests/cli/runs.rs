@@ -294,12 +294,12 @@ fn info_says_what_a_scene_holds() {
     let folder = Folder::new();
     let run = folder.good(&format!("info default {SMALL} --json a.json"));
     let found = folder.json("a.json");
-    assert_eq!(keys(&found), ["scene", "surfels", "mirrors", "objects", "methods", "ms"]);
+    assert_eq!(keys(&found), ["scene", "notes", "surfels", "mirrors", "objects", "methods", "ms"]);
     let objects = found["objects"].as_array().unwrap();
     let surfels: u64 = objects.iter().map(|o| o["surfels"].as_u64().unwrap()).sum();
     assert_eq!((Some(surfels), surfels), (found["surfels"].as_u64(), 20_000));
     for object in objects {
-        assert_eq!(keys(object), ["name", "triangles", "surfels", "box", "tree"]);
+        assert_eq!(keys(object), ["name", "triangles", "is_cloud", "surfels", "box", "tree"]);
         assert!(run.out.contains(object["name"].as_str().unwrap()), "{}", run.out);
     }
     let methods = found["methods"].as_array().unwrap();

@@ -3,14 +3,15 @@
 use std::fmt::Write as _;
 
 use catoptric::Context;
+use catoptric::geometry::Similarity;
 use catoptric::image::compare::{Set, Side, compare};
 use catoptric::scene::arrange::{self, Request};
 use catoptric::scene::sample::sample;
 use glam::DVec3;
 
-use super::{RED, looks, moved, object, prepared, rendered, scene, shape};
+use super::{RED, looks, moved, object, prepared, rendered, rendered_with, scene, shape};
 
-const SIZE: [u32; 2] = [640, 360];
+const SIZE: [u32; 2] = [960, 540];
 
 #[test]
 fn raw_points_look_as_their_mesh() {
@@ -29,7 +30,7 @@ fn raw_points_look_as_their_mesh() {
     let read = arrange::scene(&request, &cx).unwrap();
     assert!(read.notes[0].ends_with("a cloud of 100000 points; normals estimated"));
 
-    let at = moved(DVec3::new(0.9, 0.0, 1.1));
+    let at = Similarity { scale: 0.25, ..moved(DVec3::new(0.9, 0.1, 1.1)) };
     let of_mesh = object("knot", mesh, at, RED);
     let mut of_points = read.objects[0].clone();
     (of_points.name, of_points.transform, of_points.paint) = ("knot".into(), at, RED);
@@ -37,7 +38,8 @@ fn raw_points_look_as_their_mesh() {
     let eye = looks(DVec3::new(-0.8, 0.9, 3.0), DVec3::new(0.3, 0.0, 0.0));
     let with = |objects| prepared(&scene(ball(), objects, eye), 400_000);
     let [width, height] = SIZE;
-    let truth = rendered(&with(vec![of_mesh]), "raytrace", width, height);
+    let many = [("spp", "64")];
+    let truth = rendered_with(&with(vec![of_mesh]), "raytrace", &many, width, height);
     let cloud = rendered(&with(vec![of_points.clone()]), "c3rc", width, height);
     // Far below, it is as if it were not there.
     of_points.transform.translation.y = -1e4;
