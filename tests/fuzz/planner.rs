@@ -1,14 +1,19 @@
 //! Random eyes, mirrors, surfels, methods and parameters: every picture is made of numbers.
 
+use std::sync::Arc;
+
 use catoptric::Context;
 use catoptric::camera::eye::ImageSize;
 use catoptric::frame::Renderer;
-use catoptric::geometry::Mesh;
+use catoptric::geometry::surfel::PADDING;
+use catoptric::geometry::{Mesh, Similarity, Surfels};
 use catoptric::methods::{METHODS, ParamKind, Params};
-use catoptric::scene::builtin;
-use catoptric::scene::description::{Environment, EyeDescription};
-use catoptric::scene::{GivenSurfels, PreparedScene};
-use glam::Vec3;
+use catoptric::scene::description::{
+    Environment, EyeDescription, Light, Mirror, Object, Paint, Scene,
+};
+use catoptric::scene::scan::disks;
+use catoptric::scene::{PrepareOptions, PreparedScene, builtin};
+use glam::{DVec3, Vec3};
 
 /// Deals bytes out; zeros when they are used up.
 struct Dealer<'a>(&'a [u8]);
@@ -95,17 +100,53 @@ pub fn run(bytes: &[u8]) -> Option<()> {
         // Some values do not go with others, which is said when the method is asked.
         let _ = params.set(info, &text);
     }
+    let cx = Context::default();
     let count = 1 + dealer.below(64);
     let positions = dealer.vectors(count);
     let normals = dealer.vectors(count);
     let radiance: Vec<Vec3> =
         dealer.vectors(count).iter().map(|c| c.abs().min(Vec3::splat(1e6))).collect();
-    let given = GivenSurfels { positions: &positions, normals: &normals, radiance: &radiance };
-    let sky = Environment::Constant(Vec3::splat(0.25));
-    let scene = PreparedScene::from_surfels(mirror, given, eye, sky).ok()?;
+    let axis =
+        |k: usize| -> Vec<f32> { positions.iter().map(|p| p[k]).chain([0.0; PADDING]).collect() };
+    let points = Surfels {
+        x: axis(0),
+        y: axis(1),
+        z: axis(2),
+        normals: normals.iter().map(|n| n.as_dvec3().normalize_or(DVec3::Y).as_vec3()).collect(),
+        albedo: radiance,
+        radiance: vec![Vec3::ZERO; count],
+        extent: (0..count).map(|_| dealer.number().abs().max(1e-20)).collect(),
+    };
+    let scene = Scene {
+        name: String::new(),
+        eye,
+        mirrors: vec![Mirror {
+            name: "mirror".into(),
+            mesh: Arc::new(mirror),
+            source: None,
+            transform: Similarity::IDENTITY,
+            tint: Vec3::ONE,
+            proxy: None,
+        }],
+        objects: vec![Object {
+            name: "points".into(),
+            mesh: Arc::new(disks(&points, 20, false, &cx).ok()?),
+            points: Some(Arc::new(points)),
+            source: None,
+            transform: Similarity::IDENTITY,
+            paint: Paint::Vertex,
+            density: 1.0,
+        }],
+        environment: Environment::Constant(Vec3::splat(0.25)),
+        light: Light { to_sun: Vec3::Y, sun: Vec3::ONE, ambient: Vec3::ONE },
+        notes: Vec::new(),
+    };
+    // Few, so that mirrors have few, too.
+    let options = PrepareOptions { surfels: 200, ..PrepareOptions::default() };
+    let scene = PreparedScene::new(&scene, &options, &cx).ok()?;
     let size = ImageSize { width: 24, height: 14 };
     let eye = scene.eye_for(size)?;
-    let (mut renderer, cx) = (Renderer::new(), Context::default());
+    let mut renderer = Renderer::new();
     renderer.render(&scene, &eye, method, &params, true, &cx).ok()?;
     let picture = &renderer.picture().rgb;
     let bad = picture.iter().position(|color| !color.iter().all(|v| v.is_finite()));

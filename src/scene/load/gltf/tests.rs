@@ -199,7 +199,7 @@ fn what_is_wrong_is_named() {
         ("/accessors/2/componentType", json!(5126), "accessor 2: has indices that are no integers"),
         ("/bufferViews/1/byteStride", json!(4), "accessor 1: has elements of 8 bytes, 4 apart"),
         ("/bufferViews/0/byteLength", json!(47), "accessor 0: promises"),
-        ("/bufferViews/3/byteOffset", json!(96), "accessor 3: replaces element"),
+        ("/bufferViews/3/byteOffset", json!(98), "accessor 3: replaces element 128"),
         ("/buffers/0/byteLength", json!(109), "buffer 0: has 108 bytes, but the file promises 109"),
         ("/buffers/0/uri", json!("data:x;base64,?"), "buffer 0: has data that is not base64"),
         ("/nodes/1/mesh", json!(7), "is not valid glTF"),
