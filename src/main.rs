@@ -59,6 +59,7 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => error.exit(),
     };
+    quiet_decoder();
     let bars = Arc::new(Bars::default());
     let cx = Context::new(Arc::clone(&bars) as Arc<dyn Progress>)
         .with_memory(commands::memory::limit(cli.max_memory));
@@ -85,6 +86,17 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// The LAZ decoder panics on some damaged files, in a thread of its own that the reader expects to end so: what it says is no
+/// news, and an error follows.
+fn quiet_decoder() {
+    let standard = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if std::thread::current().name() != Some("las") {
+            standard(panic);
+        }
+    }));
 }
 
 /// One line on standard error, where someone may have stopped listening.

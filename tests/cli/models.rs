@@ -159,3 +159,11 @@ fn bomb() -> Vec<u8> {
     bytes.extend(b"IDAT\x35\xaf\x06\x1e");
     bytes
 }
+
+#[test]
+fn a_decoder_that_panics_is_an_error() {
+    let found = format!("{}/tests/fuzz/found/points/decoder.laz", env!("CARGO_MANIFEST_DIR"));
+    let folder = Folder::new();
+    folder.write("a.laz", fs::read(found).unwrap());
+    folder.refused(&format!("info a.laz {SMALL}"), &["a.laz: "]);
+}

@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DQuat, Vec3};
 
 use super::model::{Model, Part};
-use super::{ReadOptions, Z_TO_Y};
+use super::{ReadOptions, UpAxis, Z_TO_Y};
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::Similarity;
@@ -19,15 +19,17 @@ const MOST_DISKS: usize = 400_000;
 
 /// Reads a file of points.
 pub(super) fn read(path: &Path, options: &ReadOptions, cx: &Context) -> Result<Model> {
-    let turned = options.turn(path) == Z_TO_Y;
-    let wanted = CloudOptions {
-        most: options.points,
-        seed: options.seed,
-        up: if turned { Vec3::Z } else { Vec3::Y },
-        ..CloudOptions::default()
+    let usual = UpAxis::usual(path);
+    let up = match options.up.unwrap_or(usual) {
+        UpAxis::Y => Vec3::Y,
+        UpAxis::Z => Vec3::Z,
     };
+    let wanted =
+        CloudOptions { most: options.points, seed: options.seed, up, ..CloudOptions::default() };
     let cloud = scan::cloud(path, &wanted, cx)?;
     let mesh = scan::disks(&cloud.surfels, MOST_DISKS, cloud.has_colors, cx)?;
+    let turn = if usual == UpAxis::Z { Z_TO_Y } else { DQuat::IDENTITY };
+    let upright = Similarity { rotation: turn, ..Similarity::IDENTITY };
     let notes = vec![format!("{}: {}", path.display(), told(&cloud))];
     let part = Part {
         name: String::new(),
@@ -35,7 +37,7 @@ pub(super) fn read(path: &Path, options: &ReadOptions, cx: &Context) -> Result<M
         paint: cloud.has_colors.then_some(Paint::Vertex),
         points: Some(Arc::new(cloud.surfels)),
         mirror: None,
-        own: Similarity { translation: cloud.offset, ..Similarity::IDENTITY },
+        own: Similarity { translation: cloud.offset, ..Similarity::IDENTITY }.then(&upright),
     };
     Ok(Model { parts: vec![part], eye: None, notes })
 }

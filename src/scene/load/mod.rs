@@ -140,16 +140,24 @@ pub enum UpAxis {
 /// Turns +z to +y.
 pub const Z_TO_Y: DQuat = DQuat::from_xyzw(-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2);
 
+impl UpAxis {
+    /// Which way is up in files of this kind where nothing is said.
+    fn usual(path: &Path) -> Self {
+        match extension(path).as_deref() {
+            Some("las" | "laz") => Self::Z,
+            _ => Self::Y,
+        }
+    }
+}
+
 impl ReadOptions {
-    /// What turns the contents of a file upright: +y is up, but in surveys.
+    /// What turns a model, as it was read, upright: not what is usual for its format, which is turned already.
     pub fn turn(&self, path: &Path) -> DQuat {
-        let usual = match extension(path).as_deref() {
-            Some("las" | "laz") => UpAxis::Z,
-            _ => UpAxis::Y,
-        };
-        match self.up.unwrap_or(usual) {
-            UpAxis::Y => DQuat::IDENTITY,
-            UpAxis::Z => Z_TO_Y,
+        let usual = UpAxis::usual(path);
+        match (self.up.unwrap_or(usual), usual) {
+            (UpAxis::Z, UpAxis::Y) => Z_TO_Y,
+            (UpAxis::Y, UpAxis::Z) => Z_TO_Y.conjugate(),
+            _ => DQuat::IDENTITY,
         }
     }
 }
