@@ -397,31 +397,38 @@ fn sample_objects(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Resu
     Ok(list)
 }
 
-/// Each object's part of the surfels, by area and density. A cloud has no more than its points: the others share the rest.
+/// Of all surfels, so many are clouds' at most, where there are meshes, too.
+const CLOUDS: f64 = 0.75;
+
+/// Each object's part of the surfels. Clouds keep their points as far as there is room; meshes share the rest by area and
+/// density.
 fn allot(scene: &Scene, total: usize) -> Vec<usize> {
-    let own_area = |object: &Object| match &object.points {
-        Some(points) => sample::given::area(points),
-        None => object.mesh.area(),
+    let points: Vec<usize> =
+        scene.objects.iter().map(|o| o.points.as_ref().map_or(0, |points| points.len())).collect();
+    let all: usize = points.iter().sum();
+    let alone = points.iter().all(|&count| count > 0);
+    let room = if alone { 1.0 } else { CLOUDS } * total as f64;
+    let part = (room / all.max(1) as f64).min(1.0);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a part of a count"
+    )]
+    let of_cloud = |count: usize| ((count as f64 * part) as usize).max(1);
+    let taken: usize =
+        points.iter().filter(|&&count| count > 0).map(|&count| of_cloud(count)).sum();
+    let mesh = |i: &usize| points[*i] == 0;
+    let meshes: Vec<usize> = (0..points.len()).filter(mesh).collect();
+    let area = |&i: &usize| {
+        let object = &scene.objects[i];
+        object.mesh.area() * object.transform.scale.powi(2)
     };
-    let area = |object: &Object| own_area(object) * object.transform.scale.powi(2);
-    let areas: Vec<f64> = scene.objects.iter().map(area).collect();
-    let mut densities: Vec<f64> = scene.objects.iter().map(|o| o.density).collect();
-    let most =
-        |i: usize| scene.objects[i].points.as_ref().map_or(usize::MAX, |points| points.len());
-    let mut fixed: Vec<Option<usize>> = vec![None; areas.len()];
-    loop {
-        let taken: usize = fixed.iter().flatten().sum();
-        let shares = sample::allot(&areas, &densities, total.saturating_sub(taken));
-        let before = fixed.iter().flatten().count();
-        for i in 0..areas.len() {
-            if fixed[i].is_none() && shares[i] >= most(i) {
-                (fixed[i], densities[i]) = (Some(most(i)), 0.0);
-            }
-        }
-        if fixed.iter().flatten().count() == before {
-            return fixed.iter().zip(shares).map(|(own, share)| own.unwrap_or(share)).collect();
-        }
-    }
+    let areas: Vec<f64> = meshes.iter().map(area).collect();
+    let densities: Vec<f64> = meshes.iter().map(|&i| scene.objects[i].density).collect();
+    let mut shares = points.iter().map(|&count| of_cloud(count)).collect::<Vec<usize>>();
+    let of_meshes = sample::allot(&areas, &densities, total.saturating_sub(taken));
+    meshes.iter().zip(of_meshes).for_each(|(&i, share)| shares[i] = share);
+    shares
 }
 
 /// Surfels of all mirrors together, at most.
