@@ -112,7 +112,7 @@ impl Viewer {
         let waker = context.clone();
         let mut worker = Worker::new(move || waker.request_repaint());
         worker.load(LoadRequest {
-            what: What::Request(opening.request.clone()),
+            what: What::Request(Box::new(opening.request.clone())),
             prepare: opening.prepare,
             mirror_triangles: None,
             memory: opening.memory,
@@ -240,7 +240,7 @@ impl Viewer {
         // What is open stays, and keeps its name, until the other is there.
         let request = Request { inputs, read: self.request.read, ..Request::default() };
         self.opened = Some(request.clone());
-        self.load(What::Request(request), None);
+        self.load(What::Request(Box::new(request)), None);
     }
 
     /// Samples the open scene anew, with what the sliders say.

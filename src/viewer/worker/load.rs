@@ -27,7 +27,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 #[derive(Clone, Debug)]
 pub(crate) enum What {
     /// Files and names.
-    Request(Request),
+    Request(Box<Request>),
     /// One that is open, with things where they were put.
     Open(Arc<Scene>),
 }

@@ -24,9 +24,31 @@ enum Decode {
 /// A row has no more numbers.
 const MOST_COLUMNS: u64 = 1024;
 
+/// Brackets within each other in the header of an array: the dictionary and the shape, and the list of a record. The time of the
+/// crate's parser doubles with each.
+const DEEPEST: usize = 4;
+
+/// How deep brackets lie in each other, at most.
+fn nested(text: &[u8]) -> usize {
+    let (mut depth, mut deepest) = (0usize, 0);
+    for byte in text {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        deepest = deepest.max(depth);
+    }
+    deepest
+}
+
 impl Rows {
     pub(super) fn open(input: &mut Input) -> Result<Self> {
         let text = header_bytes(input)?;
+        if nested(&text) > DEEPEST {
+            let problem = "has a header with too many brackets within each other";
+            return Err(input.error("", problem, GET_IT_AGAIN));
+        }
         let header = NpyHeader::from_reader(&text[..])
             .map_err(|e| input.error("", format!("has a bad header: {e}"), GET_IT_AGAIN))?;
         let remedy = "save an array of floats of shape (n, 3), in C order";

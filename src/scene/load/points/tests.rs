@@ -122,6 +122,11 @@ fn what_is_no_file_of_points_is_refused() {
         ("a.npy", b"no array at all", "is no array of NumPy"),
         ("a.npy", b"\x93NUMPY\x02\x00\xff\xff\xff\xff", "has a header of 4294967295 bytes"),
         ("a.npy", b"\x93NUMPY\x01\x00\x40\x00{", "ends within its header"),
+        (
+            "a.npy",
+            &npy("<f8", "((((((9, 3))))))", "False", &[0; 72]),
+            "has a header with too many brackets",
+        ),
         ("a.npy", &npy("<f8", "(9,)", "False", &[0; 72]), "has shape [9]; save an array"),
         ("a.npy", &npy("<f8", "(3, 3)", "True", &[0; 72]), "is in Fortran order"),
         ("a.npy", &npy("<i8", "(3, 3)", "False", &[0; 72]), "has elements '<i8'"),
