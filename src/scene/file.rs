@@ -35,7 +35,7 @@
 //! ("checker", "stripes" or "rings"; the period is in local units), or else its vertex colours, or else it is
 //! light grey. An environment of the kind "image" is a panorama (`file`, relative to the scene file; equirectangular HDR, EXR,
 //! PNG or JPEG), turned by `rotate_deg` about y and made 2 to the power of `exposure` times as bright; see
-//! [`Mounting`](super::environment::image::Mounting). Instead of `scale` and `translate`, `fit` gives the diagonal of the bounding box after the
+//! [`Mounting`]. Instead of `scale` and `translate`, `fit` gives the diagonal of the bounding box after the
 //! rotation and where the middle of its bottom lies.
 
 use std::path::{Path, PathBuf};

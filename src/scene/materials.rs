@@ -43,6 +43,7 @@ impl Materials {
     }
 
     /// What it was made of.
+    #[cfg(feature = "cli")]
     pub(super) fn parts(&self) -> (Vec<u32>, Vec<[Vec2; 3]>, Vec<Material>) {
         (self.of_triangle.clone(), self.uv.clone(), self.list.clone())
     }
