@@ -74,12 +74,11 @@ impl Context {
         if taken.saturating_add(bytes) <= limit {
             return Ok(());
         }
-        let gigabytes = |bytes: u64| bytes as f64 * 1e-9;
         let problem = format!(
-            "{what} need about {:.2} GB of memory, and of the {:.2} GB allowed {:.2} are taken",
-            gigabytes(bytes),
-            gigabytes(limit),
-            gigabytes(taken)
+            "{what} need about {} of memory, and of the {} allowed {} are taken",
+            told(bytes),
+            told(limit),
+            told(taken)
         );
         Err(Error::input(
             name,
@@ -115,6 +114,12 @@ impl Context {
     }
 }
 
+/// An amount of memory, for people.
+fn told(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    if bytes < 1e9 { format!("{:.0} MB", bytes * 1e-6) } else { format!("{:.2} GB", bytes * 1e-9) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,8 +130,12 @@ mod tests {
         let cx = Context::default().with_memory(Some(limit));
         assert!(cx.room_for("a.ply", "9 points", 2_000_000_000).is_ok());
         let error = cx.room_for("a.ply", "9 points", 2_000_000_001).unwrap_err().to_string();
-        let expected = "a.ply: 9 points need about 2.00 GB of memory, and of the 3.00 GB allowed 1.00 are taken; choose";
+        let expected = "a.ply: 9 points need about 2.00 GB of memory, and of the 3.00 GB allowed 1.00 GB are taken; choose";
         assert!(error.starts_with(expected), "{error}");
+        let small = MemoryLimit { bytes: 90_000_000, taken: || 64_000_000 };
+        let cx = cx.with_memory(Some(small));
+        let error = cx.room_for("a.ply", "9 points", 195_000_000).unwrap_err().to_string();
+        assert!(error.contains("195 MB of memory, and of the 90 MB allowed 64 MB are"), "{error}");
         assert!(cx.room_for("a.ply", "9 points", u64::MAX).is_err());
         assert!(cx.with_memory(None).room_for("a.ply", "9 points", u64::MAX).is_ok());
     }

@@ -20,6 +20,9 @@ pub(crate) fn limit(asked: Option<u64>) -> Option<MemoryLimit> {
     Some(MemoryLimit { bytes, taken })
 }
 
+/// The least that can be meant: a number below it lacks its unit.
+const LEAST: f64 = 1024.0 * 1024.0;
+
 /// Parses what `--max-memory` is given: bytes, or a number of K, M, G or T (times 1024), with or without B or iB.
 pub(crate) fn parse(text: &str) -> Result<u64, String> {
     let wrong = || "give a size such as 8G or 500M".to_owned();
@@ -37,7 +40,7 @@ pub(crate) fn parse(text: &str) -> Result<u64, String> {
         _ => return Err(wrong()),
     };
     let bytes = number * 1024_f64.powi(power);
-    if !(1.0..=1e18).contains(&bytes) {
+    if !(LEAST..=1e18).contains(&bytes) {
         return Err(wrong());
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in that range")]
@@ -81,17 +84,17 @@ mod tests {
     #[test]
     fn sizes_have_units() {
         for (text, bytes) in [
-            ("1", 1),
+            ("1048576", 1 << 20),
             ("500M", 500 << 20),
             ("8G", 8 << 30),
             ("8GB", 8 << 30),
             ("1.5gib", 3 << 29),
             ("2 T", 2 << 40),
-            ("64k", 64 << 10),
+            ("2048k", 2 << 20),
         ] {
             assert_eq!(parse(text), Ok(bytes), "{text}");
         }
-        for bad in ["", "G", "0", "-1G", "nan", "inf", "1e40", "8X", "8GG", "1G2"] {
+        for bad in ["", "G", "0", "10", "64k", "-1G", "nan", "inf", "1e40", "8X", "8GG", "1G2"] {
             assert!(parse(bad).is_err(), "{bad}");
         }
     }

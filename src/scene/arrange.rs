@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Similarity;
 
 mod models;
+mod out_of_view;
 
 /// What the command line says about the scene; all of it may be empty.
 #[derive(Clone, Debug, Default)]
@@ -104,6 +105,7 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
     }
     override_eye(&mut scene.eye, request)?;
     scene.notes.append(&mut library.notes);
+    scene.notes.extend(out_of_view::note(&scene));
     Ok(scene)
 }
 
@@ -155,6 +157,10 @@ fn base(request: &Request, library: &mut Library, cx: &Context) -> Result<Scene>
 /// A built-in scene or a scene file.
 fn named(input: &str, request: &Request, cx: &Context) -> Result<Scene> {
     let path = Path::new(input);
+    if request.read.up.is_some() && request.mirrors.is_empty() && request.objects.is_empty() {
+        let remedy = "leave it out; in a scene file, rotate_deg turns a thing";
+        return Err(Error::input("--up", "", "turns models, and no model is given", remedy));
+    }
     if let Some(text) = builtin::scene_text(input) {
         return file::parse(text, input, Path::new(""), &request.read, cx);
     }
@@ -212,7 +218,7 @@ fn placed(
 ) -> Result<Placed> {
     let path = Path::new(input);
     if !builtin::SHAPES.contains(&input) && (load::is_model(path) || path.exists()) {
-        let found = library.file(path, None)?;
+        let found = library.file(path)?;
         let turn = Similarity { rotation: request.read.turn(path), ..Similarity::IDENTITY };
         let (transform, name) = (found.own().then(&turn), stem(path));
         return Ok(Placed { found, transform, name });

@@ -189,7 +189,8 @@ fn names(source: &Text, table: &SceneTable) -> Result<Vec<String>> {
         names.push(match (thing.name, thing.shape, thing.file) {
             (Some(Name(name)), ..) => name.clone(),
             (None, shape, file) => {
-                let plain = shape.cloned().or_else(|| Some(stem(Path::new(file?))));
+                let plain = shape.or(thing.part).cloned();
+                let plain = plain.or_else(|| Some(stem(Path::new(file?))));
                 let name = unique(&plain.unwrap_or_default(), &taken);
                 taken.push(name.clone());
                 name
@@ -347,7 +348,11 @@ impl Text<'_> {
                 Err(self.error(at, "triangles cannot be chosen for a file", "remove that key"))
             }
             (None, Some(file)) => {
-                library.file(&self.file(at, file, library)?, thing.part.map(String::as_str))
+                let path = self.file(at, file, library)?;
+                match thing.part {
+                    Some(part) => library.part(&path, part, |p, r| self.error(at, p, r)),
+                    None => library.file(&path),
+                }
             }
             (Some(_), Some(_)) => Err(self.error(at, "has both shape and file", "remove one")),
             (None, None) => Err(self.error(at, "has neither shape nor file", "add one of them")),

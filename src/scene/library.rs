@@ -86,29 +86,48 @@ impl<'a> Library<'a> {
         self.models.iter().find(|(known, _)| *known == resolved)?.1.eye
     }
 
-    /// What is in a file as one thing, or one of its parts.
-    pub(super) fn file(&mut self, path: &Path, part: Option<&str>) -> Result<Found> {
-        let resolved = resolved(path);
-        let is_same = |f: &&Found| matches!(&f.source, Source::File { path, part: known, .. } if *path == resolved && known.as_deref() == part);
-        if let Some(found) = self.known.iter().find(is_same) {
-            return Ok(found.clone());
+    /// What is in a file as one thing.
+    pub(super) fn file(&mut self, path: &Path) -> Result<Found> {
+        if let Some(found) = self.known_of(path, None) {
+            return Ok(found);
         }
         let (resolved, model) = self.read(path)?;
-        let Some(name) = part else {
-            let merged = model.clone().merged(path)?;
-            return Ok(self.remember(Found::of(merged, resolved, None)));
-        };
+        let note = (model.parts.len() > 1).then(|| {
+            let (shown, names) = (path.display(), names(&model.parts));
+            format!("{shown}: {names} are taken as one; a scene file can take one alone (part)")
+        });
+        let merged = model.clone().merged(path)?;
+        self.notes.extend(note);
+        Ok(self.remember(Found::of(merged, resolved, None)))
+    }
+
+    /// One of the parts of a file; `unknown` says where the name was given.
+    pub(super) fn part(
+        &mut self,
+        path: &Path,
+        name: &str,
+        unknown: impl FnOnce(String, String) -> Error,
+    ) -> Result<Found> {
+        if let Some(found) = self.known_of(path, Some(name)) {
+            return Ok(found);
+        }
+        let (resolved, model) = self.read(path)?;
         let wanted = model.parts.iter().find(|p| p.name == name).cloned();
         let Some(wanted) = wanted else {
-            let names: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).collect();
-            let problem = format!("has no part \"{name}\"");
-            let remedy = match names[..] {
+            let problem = format!("{} has no part \"{name}\"", path.display());
+            let remedy = match model.parts[..] {
                 [_] => "it is all one: leave the part out".to_owned(),
-                _ => format!("its parts are {}", names.join(", ")),
+                _ => format!("there are {}", names(&model.parts)),
             };
-            return Err(Error::file(path, "", problem, remedy));
+            return Err(unknown(problem, remedy));
         };
         Ok(self.remember(Found::of(wanted, resolved, Some(name.to_owned()))))
+    }
+
+    fn known_of(&self, path: &Path, part: Option<&str>) -> Option<Found> {
+        let resolved = resolved(path);
+        let is_same = |f: &&Found| matches!(&f.source, Source::File { path, part: known, .. } if *path == resolved && known.as_deref() == part);
+        self.known.iter().find(is_same).cloned()
     }
 
     /// A built-in shape with about so many triangles; `unknown` says where the name was given.
@@ -140,7 +159,7 @@ impl<'a> Library<'a> {
     ) -> Result<Proxy> {
         let path = Path::new(input);
         if !builtin::SHAPES.contains(&input) && (load::is_model(path) || path.exists()) {
-            let found = self.file(path, None)?.mirror()?;
+            let found = self.file(path)?.mirror()?;
             let transform = found.own();
             return Ok(Proxy { mesh: found.mesh, source: Some(found.source), transform });
         }
@@ -172,6 +191,17 @@ impl<'a> Library<'a> {
         self.known.push(found.clone());
         found
     }
+}
+
+/// Names in a list for people, at most.
+const NAMED: usize = 12;
+
+/// The names of parts, for people.
+fn names(parts: &[Part]) -> String {
+    let names: Vec<&str> = parts.iter().take(NAMED).map(|p| p.name.as_str()).collect();
+    let more = parts.len() - names.len();
+    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{rest}", names.join(", "))
 }
 
 /// If a path cannot be resolved, reading it says why.

@@ -229,6 +229,8 @@ pub struct PreparedScene {
 
 /// Peak bytes a surfel (measured between 1 and 10 million: 126).
 const SURFEL_BYTES: u64 = 130;
+/// Peak bytes a triangle of an object, in addition to its mesh (measured between 1 and 3 million: 390 with it).
+const TRIANGLE_BYTES: u64 = 350;
 
 /// Whether there is room for a scene with so many surfels.
 ///
@@ -253,6 +255,9 @@ impl PreparedScene {
     pub fn new(scene: &Scene, options: &PrepareOptions, cx: &Context) -> Result<Self> {
         options.check()?;
         check_room(options.surfels, cx)?;
+        let triangles: usize = scene.objects.iter().map(|o| o.mesh.triangles().len()).sum();
+        let bytes = TRIANGLE_BYTES.saturating_mul(triangles as u64);
+        cx.room_for(&scene.name, &format!("its {triangles} triangles"), bytes)?;
         let start = Instant::now();
         let mut sampled = sample_objects(scene, options, cx)?;
         sampled.extend(sample_mirrors(scene, options.surfels, options.seed, cx)?);
@@ -287,7 +292,10 @@ impl PreparedScene {
                 is_cloud: object.points.is_some(),
                 detail: 0.0,
                 own_detail: object.points.as_ref().map_or(0.0, |points| {
-                    shade::CLOUD_ROUGHNESS * sample::given::mean_extent(points)
+                    // As large as the squares, of which there may be fewer.
+                    let squares = (object.mesh.triangles().len() / 2).max(1);
+                    let fewer = (points.len() as f32 / squares as f32).max(1.0);
+                    shade::CLOUD_ROUGHNESS * sample::given::mean_extent(points) * fewer.sqrt()
                 }),
                 paint: object.paint.clone(),
                 to_scene: Similarity::IDENTITY,

@@ -24,8 +24,8 @@ pub fn shade(albedo: Vec3, normal: Vec3, sun_visible: bool, light: &Light) -> Ve
 const BLOCK: usize = 64 * CHUNK;
 
 /// Sets the radiance of the surfels in `range`, which belong to an object that `to_scene` takes to scene space,
-/// with `occluders` between them and the sun. Detail that is smaller than `roughness` times a surfel casts no shadow on it: 1,
-/// but [`CLOUD_ROUGHNESS`] for a cloud of points. Fastest if surfels that follow each other are close.
+/// with `occluders` between them and the sun. Detail that is smaller than a surfel, or than `detail` (scene units), casts no
+/// shadow on it. Fastest if surfels that follow each other are close.
 ///
 /// # Errors
 /// [`crate::Error::Cancelled`].
@@ -36,7 +36,7 @@ pub fn bake(
     surfels: &mut Surfels,
     range: Range<usize>,
     to_scene: &Similarity,
-    roughness: f32,
+    detail: f32,
     occluders: &TriangleBvh,
     light: &Light,
     cx: &Context,
@@ -53,7 +53,7 @@ pub fn bake(
                 .map(|i| SurfacePoint {
                     position: place(to_scene, Vec3::new(x[i], y[i], z[i])),
                     normal: to_scene.direction(normals[i].as_dvec3()).as_vec3(),
-                    extent: extent[i] * roughness * scale_of(to_scene),
+                    extent: (extent[i] * scale_of(to_scene)).max(detail),
                 })
                 .collect();
             for ((i, radiance), visible) in (first..).zip(radiance).zip(sun.visible(&points)) {
@@ -103,7 +103,7 @@ pub struct Sun<'a> {
 const APART: f32 = 2e-6;
 
 /// The squares that stand for points overlap each other: where their normals are estimated, up to about an extent
-/// off the surface (looked at on scans).
+/// off the surface (looked at on scans). So detail smaller than this times an extent casts none.
 pub const CLOUD_ROUGHNESS: f32 = 1.0 / LIFT;
 
 /// Shadow rays start this part of a surfel's extent off the surface: detail finer than a surfel casts none.

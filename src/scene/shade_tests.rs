@@ -52,7 +52,7 @@ fn a_sphere_on_the_ground_has_its_closed_form_shadow_up_to_the_contact() {
             .collect();
         let mut made = surfels(ground.iter().map(|&p| (p, Vec3::Y)), 0.004);
         let range = 0..made.len();
-        bake(&mut made, range, &Similarity::IDENTITY, 1.0, &bvh, &light, &Context::default())
+        bake(&mut made, range, &Similarity::IDENTITY, 0.0, &bvh, &light, &Context::default())
             .unwrap();
         let (mut dark, mut bright, mut wrong) = (0, 0, 0);
         for (p, radiance) in ground.iter().zip(&made.radiance) {
@@ -142,12 +142,12 @@ fn a_moved_object_is_shaded_where_it_is() {
     let mut made = surfels([(Vec3::ZERO, Vec3::NEG_Z), (Vec3::X, Vec3::NEG_Z)], 0.01);
     let bvh = TriangleBvh::build(&sphere(Vec3::new(4.0, 3.0, -2.0), 0.5, 30, 60));
     let light = light(Vec3::Y);
-    bake(&mut made, 0..2, &to_scene, 1.0, &bvh, &light, &Context::default()).unwrap();
+    bake(&mut made, 0..2, &to_scene, 0.0, &bvh, &light, &Context::default()).unwrap();
     assert_eq!(made.radiance[0], light.ambient, "under the ball");
     assert!(made.radiance[1].distance(light.ambient + light.sun) < 1e-6, "beside it");
     let before = made.radiance[1];
     made.radiance[1] = Vec3::NAN;
-    bake(&mut made, 0..1, &to_scene, 1.0, &bvh, &light, &Context::default()).unwrap();
+    bake(&mut made, 0..1, &to_scene, 0.0, &bvh, &light, &Context::default()).unwrap();
     assert!(made.radiance[1].is_nan() && before.is_finite(), "only the range is touched");
 }
 
@@ -157,6 +157,6 @@ fn cancelling_stops_it() {
     cx.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
     let mut made = surfels([(Vec3::ZERO, Vec3::Y)], 0.01);
     let bvh = TriangleBvh::build(&[]);
-    let result = bake(&mut made, 0..1, &Similarity::IDENTITY, 1.0, &bvh, &light(Vec3::Y), &cx);
+    let result = bake(&mut made, 0..1, &Similarity::IDENTITY, 0.0, &bvh, &light(Vec3::Y), &cx);
     assert!(matches!(result, Err(crate::Error::Cancelled)));
 }

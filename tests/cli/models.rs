@@ -44,7 +44,13 @@ fn a_file_with_a_mirror_is_a_scene() {
     folder.write("a.toml", text);
     folder.ok(&format!("render a.toml {SMALL} -o out.png"));
     folder.write("b.toml", text.replace("\"board\"", "\"bored\""));
-    folder.refused("info b.toml", &["a.glb: has no part \"bored\"", "its parts are board, glass"]);
+    folder.refused("info b.toml", &["b.toml: line 7: ", "no part \"bored\"", "are board, glass"]);
+    assert!(folder.ok(&format!("info a.toml {SMALL}")).0.contains("object board"));
+    // All of it as one thing, and too far away to be seen.
+    let (_, noted) = folder.ok(&format!("info --mirror a.glb {SMALL}"));
+    assert!(noted.contains("a.glb: board, glass are taken as one"), "{noted}");
+    let (_, noted) = folder.ok(&format!("info --mirror a.glb --eye 1e6,0,0 {SMALL}"));
+    assert!(noted.contains("no mirror is in view: a, "), "{noted}");
 }
 
 #[test]
@@ -81,6 +87,7 @@ fn up_turns_models() {
     assert!(height("") < 0.01);
     assert!((height("--up z") - 3.0).abs() < 0.1);
     folder.refused("info a.obj --up x", &["--up", "y, z"]);
+    folder.refused("info default --up z", &["--up: turns models, and no model is given"]);
 }
 
 #[test]
@@ -110,7 +117,7 @@ fn memory_is_not_taken_beyond_the_limit() {
     let folder = Folder::new();
     folder.refused(
         "render --max-memory 300M -o out.png",
-        &["--surfels: 3000000 surfels need about 0.39 GB", "--max-memory"],
+        &["--surfels: 3000000 surfels need about 390 MB", "--max-memory"],
     );
     folder.refused(
         "render --max-memory 1G --size 16384x16384 -o out.png",
@@ -118,11 +125,23 @@ fn memory_is_not_taken_beyond_the_limit() {
     );
     folder.ok(&format!("info --max-memory 300M {SMALL}"));
     folder.refused("info --max-memory lots", &["--max-memory", "such as 8G"]);
+    folder.refused("info --max-memory 10", &["--max-memory", "such as 8G"]);
     let scene = "[eye]\nposition = [0, 1, 5]\ntarget = [0, 0, 0]\n[[mirror]]\nshape = \"sphere\"\ntriangles = 50000000\n";
     folder.write("a.toml", scene);
     folder.refused(
         &format!("info a.toml {SMALL} --max-memory 1G"),
         &["sphere: 50000000 triangles need about 7.50 GB"],
+    );
+    folder.write(
+        "b.toml",
+        format!(
+            "{}[[object]]\nshape = \"sphere\"\ntriangles = 1000000\n",
+            scene.replace("50000000", "50")
+        ),
+    );
+    folder.refused(
+        &format!("info b.toml {SMALL} --max-memory 250M"),
+        &["b: its ", " triangles need about 350 MB"],
     );
     // A picture that would be much larger than its file.
     folder.write("a.mtl", "newmtl a\nmap_Kd a.png\n");

@@ -99,6 +99,9 @@ fn beside_teapot(request: &Request, library: &mut Library) -> Result<Scene> {
         let meshes: Vec<(&Mesh, Similarity)> =
             things.iter().map(|(part, _)| (&*part.mesh, part.own)).collect();
         let mut transform = fit(&meshes, request.read.turn(path), OBJECT_DIAGONAL, BESIDE);
+        if things.iter().all(|(part, _)| part.points.is_none()) && has_floor(&meshes, &transform) {
+            transform.translation.y += MAT;
+        }
         let placed = |transform: &Similarity| -> Vec<(&Mesh, Similarity)> {
             meshes.iter().map(|(mesh, own)| (*mesh, own.then(transform))).collect()
         };
@@ -117,6 +120,30 @@ fn beside_teapot(request: &Request, library: &mut Library) -> Result<Scene> {
     let ground = ground(GROUND_SHARE * far, library)?;
     scene.objects.push(Object { name: new_name(&scene, "ground"), ..ground });
     Ok(scene)
+}
+
+/// A model's own floor lies so far above the ground, world units: in one plane, each would show through the other.
+const MAT: f64 = 0.004;
+/// A floor covers at least this part of what the model covers.
+const FLOOR_SHARE: f64 = 0.1;
+
+/// Whether a model that stands on the ground has triangles in the ground's plane that face up.
+fn has_floor(meshes: &[(&Mesh, Similarity)], transform: &Similarity) -> bool {
+    let mut floor = 0.0;
+    for (mesh, own) in meshes {
+        let all = own.then(transform);
+        for corners in mesh.triangles() {
+            let [a, b, c] = corners.map(|i| all.point(mesh.positions()[i as usize].as_dvec3()));
+            if a.y.max(b.y).max(c.y) < MAT {
+                floor += (0.5 * (b - a).cross(c - a).y).max(0.0);
+            }
+        }
+    }
+    let boxes: Vec<_> =
+        meshes.iter().map(|(m, own)| world_bounds(m, &own.then(transform))).collect();
+    let min = boxes.iter().fold(DVec3::INFINITY, |low, b| low.min(b.0));
+    let max = boxes.iter().fold(DVec3::NEG_INFINITY, |high, b| high.max(b.1));
+    floor > FLOOR_SHARE * (max.x - min.x) * (max.z - min.z)
 }
 
 /// The ground reaches so much farther than what stands on it.

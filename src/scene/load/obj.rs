@@ -93,6 +93,8 @@ struct Paints {
     coordinates: Vec<Vec2>,
     /// Indices of a triangle's; empty if no material is named.
     corners: Vec<[u32; 3]>,
+    /// Faces of fewer than three vertices.
+    edges: usize,
 }
 
 impl Paints {
@@ -118,6 +120,12 @@ impl Paints {
     /// Gives the mesh its materials, and divides it into what is diffuse and each mirror.
     fn paint(&self, path: &Path, mut mesh: Assembly, outside: bool, cx: &Context) -> Result<Model> {
         let mut textures = Textures::default();
+        if self.edges > 0 {
+            let (shown, count) = (path.display(), self.edges);
+            textures
+                .notes
+                .push(format!("{shown}: {count} faces of fewer than three vertices left out"));
+        }
         let named = self.named(path, outside, &mut textures, cx)?;
         // Faces before the first material have none; the list begins where `face` began to note.
         let first = mesh.triangles.len() - self.of_triangle.len();
@@ -199,6 +207,15 @@ impl Paints {
                     textures.notes.push(format!("{error}: shown without its materials"));
                 }
             }
+        }
+        let unknown = |name: &&str| named.iter().all(|n| n.name != **name);
+        let missing: Vec<&str> = self.names.iter().map(String::as_str).filter(unknown).collect();
+        if !named.is_empty() && !missing.is_empty() {
+            textures.notes.push(format!(
+                "{}: no material file has {}: shown without",
+                path.display(),
+                missing.join(", ")
+            ));
         }
         named.retain(|n| self.names.contains(&n.name));
         Ok(named)
@@ -319,12 +336,13 @@ impl Source<'_> {
             self.paints.coordinates.push(place);
             return Ok(());
         }
+        if key == "f" && count < 3 {
+            // Edges without a face, as some programs write them.
+            self.paints.edges += 1;
+            return Ok(());
+        }
         self.tidy.push_str(key);
         if key == "f" {
-            if count < 3 {
-                let problem = format!("has a face of {count} vertices, which needs at least 3");
-                return Err((problem, GET_IT_AGAIN));
-            }
             let corners: Result<Vec<u32>, String> = words.map(|word| self.corner(word)).collect();
             self.paints.face(&corners.map_err(|p| (p, REPAIR))?);
             return Ok(());

@@ -58,13 +58,12 @@ impl PreparedScene {
         self.triangles = bvh(self.objects.iter().map(|o| (&*o.mesh, &o.positions[..])));
         self.sun_map = self.map_shadows();
         for (cloud, object) in self.clouds.iter().zip(&self.objects) {
-            let roughness = if object.is_cloud { shade::CLOUD_ROUGHNESS } else { 1.0 };
             let range = cloud.surfels.start as usize..cloud.surfels.end as usize;
             shade::bake(
                 &mut self.surfels,
                 range,
                 &cloud.to_scene,
-                roughness,
+                object.detail,
                 &self.triangles,
                 &self.light,
                 cx,
