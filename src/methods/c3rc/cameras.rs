@@ -303,7 +303,7 @@ pub(super) fn of_view(
                 screen: *screen,
                 per_px: [footprint.base, footprint.per_lambda]
                     .map(|m| [m.x_axis, m.y_axis].map(|x| array(x / radius))),
-                gaze: gaze(cloud, &own_grown, to_scene.inverse_point(position), hides && *leaves),
+                gaze: gaze(cloud, &own_grown, hides && *leaves),
                 representatives: cloud.representatives.start,
                 detail: detail as f32,
                 radius: radius as f32,
@@ -394,12 +394,13 @@ fn own_detail(detail: f64, corners: &[DVec3; 3], footprint: &Footprint, range: [
     if needed.is_finite() { detail.max(needed.min(detail * MOST_DETAIL)) } else { detail }
 }
 
-/// See [`CameraInstance::gaze`]. From inside an object its far side is seen from behind, and an `eye` outside sees no mirror
-/// inside; `leaves`: the rays start on the object's own outside.
+/// See [`CameraInstance::gaze`]. From inside an object its far side is seen from behind; `leaves`: the rays start on its
+/// outside or elsewhere.
 #[expect(clippy::cast_possible_truncation, reason = "rounded once, with a margin")]
-fn gaze(cloud: &Cloud, rays: &Rays, eye: DVec3, leaves: bool) -> Option<Gaze> {
-    let outside = !cloud.tree.bounds().contains(eye.as_vec3());
-    if !cloud.closed || !(leaves || outside) {
+fn gaze(cloud: &Cloud, rays: &Rays, leaves: bool) -> Option<Gaze> {
+    let bounds = cloud.tree.bounds();
+    let outside = |v: &DVec3| !bounds.contains(v.as_vec3());
+    if !cloud.closed || !(leaves || rays.origins.iter().all(outside)) {
         return None;
     }
     let axis = rays.axis()?;
