@@ -56,8 +56,9 @@ fn close(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             let a = sides[i];
             let b = sides[i + 1];
             let covered = min(min(a.layer.x, a.layer.z), min(b.layer.x, b.layer.z));
-            let alike = SAME_SURFACE_SHARE * layer.y;
-            if covered > closed && abs(a.layer.y - layer.y) <= alike && abs(b.layer.y - layer.y) <= alike {
+            let off = abs(0.5 * (a.layer.y + b.layer.y) - layer.y);
+            let alike = off <= SAME_SURFACE_SHARE * layer.y + SLOPE * abs(a.layer.y - b.layer.y);
+            if covered > closed && alike {
                 closed = covered;
                 between = (a.color + b.color) * 0.5;
             }

@@ -88,6 +88,7 @@ fn constants(shape: SplatShape) -> String {
         ("MOST_CORRECTION_PX", projection::MOST_CORRECTION_PX),
         ("SAME_SURFACE_RADII", projection::SAME_SURFACE),
         ("SAME_SURFACE_SHARE", blend::SAME_SURFACE),
+        ("SLOPE", blend::SLOPE),
         ("GAIN", blend::GAIN),
         ("CLOSING", blend::CLOSING),
         ("WHOLE", blend::WHOLE),

@@ -15,8 +15,11 @@ pub(crate) const GAIN: f32 = 1.3;
 pub(crate) const CLOSING: f32 = 0.4;
 /// Of a pixel that is covered, but for rounding.
 pub(crate) const WHOLE: f32 = 0.999_99;
-/// Pixels show one surface if their depths differ by less than this share (untuned).
+/// Three pixels in a row show one surface if the depth in the middle is that between the others but for this share of it, and
+/// for a part of what these differ by, [`SLOPE`], as the nearest splats do not lie in the pixels' middles (untuned).
 pub(crate) const SAME_SURFACE: f32 = 0.02;
+/// See [`SAME_SURFACE`] (untuned).
+pub(crate) const SLOPE: f32 = 0.125;
 /// Splats drawn before it is asked whether any pixel is still open (untuned).
 const UNTIL_FULL: usize = 32;
 
@@ -259,10 +262,12 @@ impl Layers {
             let mut closed = front;
             let mut between = own;
             for (a, b) in beside {
-                let alike = |other: usize| (get(NEAR, other) - near).abs() <= SAME_SURFACE * near;
+                let depths = [get(NEAR, a), get(NEAR, b)];
+                let off = (0.5 * (depths[0] + depths[1]) - near).abs();
+                let alike = off <= SAME_SURFACE * near + SLOPE * (depths[0] - depths[1]).abs();
                 let of_front = |slot: usize| get(FRONT, slot).min(get(FULL, slot));
                 let covered = of_front(a).min(of_front(b));
-                if covered > closed && alike(a) && alike(b) {
+                if covered > closed && alike {
                     closed = covered;
                     between = (value(a) + value(b)) * 0.5;
                 }
@@ -422,6 +427,16 @@ mod tests {
             layers.planes[NEAR][other] = 0.9;
         }
         assert!(is(layers.at(SLOT), 0.6, 0.4, 0.0, 1.0));
+        // A slope is one surface, however steep for the distance; before a step it is not.
+        for (below, beyond, closed) in [(0.8, 1.2, 1.0), (0.9, 1.1, 1.0), (1.0, 1.1, 0.6)] {
+            let mut layers = gap(0.6, 0.4);
+            for (slot, depth) in
+                [(SLOT - 1, below), (SLOT - 5, below), (SLOT + 1, beyond), (SLOT + 5, beyond)]
+            {
+                layers.planes[NEAR][slot] = depth;
+            }
+            assert!(is(layers.at(SLOT), closed, 1.0 - closed, 0.0, 1.0), "{below} to {beyond}");
+        }
         // What mirrors hide wholly shows no object, whatever its neighbours do.
         let mut layers = gap(0.6, 0.4);
         for plane in [0, 1, SHOWN] {

@@ -86,8 +86,9 @@ pub(crate) const PER_DISK: f32 = 1.0 / (EVENNESS * EVENNESS);
 pub(crate) const LEAST_FACING: f32 = 0.2;
 /// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
 pub(crate) const MOST_CORRECTION_PX: f32 = 2.0;
-/// Surfels within so many of their radii in depth show one surface (untuned).
-pub(crate) const SAME_SURFACE: f32 = 3.0;
+/// Surfels within so many of their radii in depth show one surface, also where it is steep: with 3, what is behind showed through
+/// things close to a mirror.
+pub(crate) const SAME_SURFACE: f32 = 6.0;
 /// Of any vector.
 const MOST_LANES: usize = 32;
 

@@ -31,16 +31,21 @@ pub(super) fn check(path: &Path, root: &Root) -> Result<()> {
         return Err(wrong(format!("images[{i}]"), missing));
     }
     let mut first = None;
+    let mut unsupported = None;
     root.validate(root, Place::new, &mut |place: &dyn Fn() -> Place, error: Invalid| {
+        if unsupported.is_none() && matches!(error, Invalid::Unsupported) {
+            unsupported = Some(place().to_string()).filter(|p| p.contains("extensionsRequired"));
+        }
         first.get_or_insert_with(|| (place().to_string(), error));
     });
+    // What it asks for may be why the rest seems wrong: compressed data are not where they should be.
+    if let Some(place) = unsupported {
+        let problem = "needs an extension that is not supported";
+        let remedy = "export it without compression or other required extensions";
+        return Err(Error::file(path, place, problem, remedy));
+    }
     match first {
         None => Ok(()),
-        Some((place, Invalid::Unsupported)) if place.contains("extensionsRequired") => {
-            let problem = "needs an extension that is not supported";
-            let remedy = "export it without compression or other required extensions";
-            Err(Error::file(path, place, problem, remedy))
-        }
         Some((place, error)) => Err(wrong(place, &format!("is not valid glTF: {error}"))),
     }
 }

@@ -34,7 +34,8 @@ const VERTEX_BYTES: u64 = 160;
 
 /// Reads a glTF or GLB file.
 pub(super) fn read(path: &Path, bytes: &[u8], outside: bool, cx: &Context) -> Result<Model> {
-    let mut file = Gltf::from_slice_without_validation(bytes).map_err(|e| unreadable(path, &e))?;
+    let mut file =
+        Gltf::from_slice_without_validation(bytes).map_err(|e| unreadable(path, bytes, &e))?;
     check::check(path, file.as_json())?;
     let nearby = Nearby::of(path, outside);
     let buffers = buffers::read(path, &mut file, nearby, cx)?;
@@ -110,9 +111,21 @@ fn parts(
     Ok(parts)
 }
 
-fn unreadable(path: &Path, error: &gltf::Error) -> Error {
+fn unreadable(path: &Path, bytes: &[u8], error: &gltf::Error) -> Error {
+    if is_version_1(bytes) {
+        let problem = "is glTF 1.0, which is not supported";
+        return Error::file(path, "", problem, "export or convert it to glTF 2.0");
+    }
     let error = one_line(&error.to_string());
     Error::file(path, "", format!("is not a glTF file that can be read: {error}"), GET_IT_AGAIN)
+}
+
+fn is_version_1(bytes: &[u8]) -> bool {
+    if bytes.starts_with(b"glTF") {
+        return bytes.get(4..8) == Some(&[1, 0, 0, 0]);
+    }
+    let file = serde_json::from_slice::<serde_json::Value>(bytes).unwrap_or_default();
+    file["asset"]["version"].as_str().is_some_and(|version| version.starts_with("1."))
 }
 
 /// What others say, as part of a message of one line.

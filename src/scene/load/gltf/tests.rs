@@ -216,9 +216,21 @@ fn what_is_wrong_is_named() {
         };
         assert!(found.contains(wanted), "{path} = {to}:\n  {found}\n  instead of {wanted}");
     }
-    let compressed =
-        complaint(&|v| v["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]));
+    // Whose data have no place of their own then.
+    let compressed = complaint(&|v| {
+        v["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+        v["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+    });
     assert!(compressed.contains("without compression"), "{compressed}");
+    let old = complaint(&|v| {
+        v["asset"]["version"] = json!("1.0");
+        v["nodes"] = json!({});
+    });
+    assert!(old.contains("is glTF 1.0, which is not supported"), "{old}");
+    let binary = [b"glTF".as_slice(), &[1, 0, 0, 0, 20, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]].concat();
+    let path = Path::new("a.glb");
+    let old = model_of_bytes(path, &binary, &ReadOptions::default(), &Context::default());
+    assert!(old.unwrap_err().to_string().contains("is glTF 1.0"));
     let lines = complaint(&|v| {
         v["meshes"][0]["primitives"][0]["mode"] = json!(1);
         v["meshes"][1]["primitives"][0]["mode"] = json!(0);
