@@ -57,7 +57,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], outside: bool, cx: &Context) -> Re
     }
     let place = format!("line {}", source.line);
     let (models, _) = loaded.map_err(|e| Error::file(path, place, e.to_string(), REPAIR))?;
-    let mesh = models.into_iter().next().ok_or_else(|| no_faces(path))?.mesh;
+    let mesh = models.into_iter().next().map(|m| m.mesh).filter(|m| !m.indices.is_empty());
+    let mesh = mesh.ok_or_else(|| no_faces(path))?;
     let vectors =
         |list: &[f32]| -> Vec<Vec3> { list.chunks_exact(3).map(Vec3::from_slice).collect() };
     let complete = mesh.normals.len() == mesh.positions.len();

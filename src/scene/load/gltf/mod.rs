@@ -125,7 +125,8 @@ fn is_version_1(bytes: &[u8]) -> bool {
         return bytes.get(4..8) == Some(&[1, 0, 0, 0]);
     }
     let file = serde_json::from_slice::<serde_json::Value>(bytes).unwrap_or_default();
-    file["asset"]["version"].as_str().is_some_and(|version| version.starts_with("1."))
+    let version = &file["asset"]["version"];
+    version.as_str().is_some_and(|text| text.starts_with("1.")) || version.as_f64() == Some(1.0)
 }
 
 /// What others say, as part of a message of one line.
