@@ -105,7 +105,10 @@ pub fn scene(request: &Request, cx: &Context) -> Result<Scene> {
     }
     override_eye(&mut scene.eye, request)?;
     scene.notes.append(&mut library.notes);
-    scene.notes.extend(out_of_view::note(&scene));
+    // Files lie where they lie; who says where the eye is knows.
+    if !request.mirrors.is_empty() && request.eye.is_none() && request.target.is_none() {
+        scene.notes.extend(out_of_view::note(&scene));
+    }
     Ok(scene)
 }
 

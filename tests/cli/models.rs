@@ -49,8 +49,11 @@ fn a_file_with_a_mirror_is_a_scene() {
     // All of it as one thing, and too far away to be seen.
     let (_, noted) = folder.ok(&format!("info --mirror a.glb {SMALL}"));
     assert!(noted.contains("a.glb: board, glass are taken as one"), "{noted}");
-    let (_, noted) = folder.ok(&format!("info --mirror a.glb --eye 1e6,0,0 {SMALL}"));
-    assert!(noted.contains("no mirror is in view: a, "), "{noted}");
+    folder.write("far.obj", "v 900 0 0\nv 901 0 0\nv 900 1 0\nf 1 2 3\n");
+    let (_, noted) = folder.ok(&format!("info --mirror far.obj {SMALL}"));
+    assert!(noted.contains("no mirror is in view: far, 1.414 across"), "{noted}");
+    let (_, noted) = folder.ok(&format!("info --mirror far.obj --eye 901,0,5 {SMALL}"));
+    assert_eq!(noted, "", "who says where the eye is knows");
 }
 
 #[test]

@@ -303,7 +303,7 @@ impl Source<'_> {
             let key = keyword(line);
             if matches!(key, b"v" | b"vn" | b"vt" | b"f") {
                 let checked = match str::from_utf8(code(line)) {
-                    Ok(text) => self.tidy_up(text),
+                    Ok(text) => self.tidy_up(text, !line.ends_with(b"\n")),
                     Err(_) => Err(("is not text".into(), GET_IT_AGAIN)),
                 };
                 checked.map_err(|(problem, remedy)| {
@@ -326,8 +326,8 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// Checks a line and rewrites it without what is not needed.
-    fn tidy_up(&mut self, line: &str) -> Result<(), (String, &'static str)> {
+    /// Checks a line and rewrites it without what is not needed. `is_cut`: it has no end, being the last one.
+    fn tidy_up(&mut self, line: &str, is_cut: bool) -> Result<(), (String, &'static str)> {
         let mut words = line.split_ascii_whitespace();
         let key = words.next().unwrap_or_default();
         let count = words.clone().count();
@@ -338,6 +338,10 @@ impl Source<'_> {
             return Ok(());
         }
         if key == "f" && count < 3 {
+            if is_cut {
+                let problem = format!("has a face of {count} vertices, which needs at least 3");
+                return Err((problem, GET_IT_AGAIN));
+            }
             // Edges without a face, as some programs write them.
             self.paints.edges += 1;
             return Ok(());
