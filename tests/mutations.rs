@@ -36,21 +36,16 @@ fn files(kind: &str, target: &str) -> Vec<(PathBuf, Vec<u8>)> {
         .collect()
 }
 
-/// Runs an input: whether it was accepted, or what went wrong. What takes too long is run again: other programs may have held the
-/// machine.
+/// Runs an input: whether it was accepted, or what went wrong.
 fn tried(target: &str, bytes: &[u8]) -> Result<bool, String> {
-    let mut took = Duration::MAX;
-    for _ in 0..2 {
-        let start = Instant::now();
-        let done = catch_unwind(AssertUnwindSafe(|| entries::run(target, bytes)));
-        took = took.min(start.elapsed());
-        match done {
-            Err(_) => return Err("panicked".into()),
-            Ok(_) if took > LONGEST => {}
-            Ok(accepted) => return Ok(accepted),
-        }
+    let start = Instant::now();
+    let done = catch_unwind(AssertUnwindSafe(|| entries::run(target, bytes)));
+    let took = start.elapsed();
+    match done {
+        Err(_) => Err("panicked".into()),
+        Ok(_) if took > LONGEST => Err(format!("took {:.1} s", took.as_secs_f64())),
+        Ok(accepted) => Ok(accepted),
     }
-    Err(format!("took {:.1} s", took.as_secs_f64()))
 }
 
 fn seeds_are_good_and_found_cases_stay_mended() {

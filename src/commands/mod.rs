@@ -25,7 +25,7 @@ use catoptric::image::io::write_bytes;
 use catoptric::methods::{METHODS, Method, MethodInfo, Params, method};
 use catoptric::scene::arrange::{self, Request};
 use catoptric::scene::description::Scene;
-use catoptric::scene::load::{ReadOptions, UpAxis};
+use catoptric::scene::load::{self, ReadOptions, UpAxis};
 use catoptric::scene::prepared::{self, DEFAULT_SURFELS, PrepareOptions, PreparedScene};
 use catoptric::{Context, Error, Result};
 use clap::{Arg, ArgMatches, Args, Command};
@@ -203,6 +203,13 @@ impl PlaceArgs {
 
     /// What can be refused before anything is read, and the threads. `surfels`: as many as will be made.
     pub(crate) fn begin(&self, surfels: usize, cx: &Context) -> anyhow::Result<()> {
+        let model = |name: &String| load::is_model(Path::new(name));
+        let given = [&self.inputs, &self.mirror, &self.object];
+        if self.read.up.is_some() && !given.into_iter().flatten().any(model) {
+            let remedy = "leave it out; in a scene file, rotate_deg turns a thing";
+            let error = Error::input("--up", "", "turns models, and no model is given", remedy);
+            return Err(error.into());
+        }
         prepared::check_room(surfels, cx)?;
         memory::check(self.size, cx)?;
         begin(self.threads)

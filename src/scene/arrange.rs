@@ -160,10 +160,6 @@ fn base(request: &Request, library: &mut Library, cx: &Context) -> Result<Scene>
 /// A built-in scene or a scene file.
 fn named(input: &str, request: &Request, cx: &Context) -> Result<Scene> {
     let path = Path::new(input);
-    if request.read.up.is_some() && request.mirrors.is_empty() && request.objects.is_empty() {
-        let remedy = "leave it out; in a scene file, rotate_deg turns a thing";
-        return Err(Error::input("--up", "", "turns models, and no model is given", remedy));
-    }
     if let Some(text) = builtin::scene_text(input) {
         return file::parse(text, input, Path::new(""), &request.read, cx);
     }

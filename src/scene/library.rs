@@ -93,7 +93,7 @@ impl<'a> Library<'a> {
         }
         let (resolved, model) = self.read(path)?;
         let note = (model.parts.len() > 1).then(|| {
-            let (shown, names) = (path.display(), names(&model.parts));
+            let (shown, names) = (path.display(), listed(model.names()));
             format!("{shown}: {names} are taken as one; a scene file can take one alone (part)")
         });
         let merged = model.clone().merged(path)?;
@@ -117,7 +117,7 @@ impl<'a> Library<'a> {
             let problem = format!("{} has no part \"{name}\"", path.display());
             let remedy = match model.parts[..] {
                 [_] => "it is all one: leave the part out".to_owned(),
-                _ => format!("there are {}", names(&model.parts)),
+                _ => format!("there are {}", listed(model.names())),
             };
             return Err(unknown(problem, remedy));
         };
@@ -196,10 +196,10 @@ impl<'a> Library<'a> {
 /// Names in a list for people, at most.
 const NAMED: usize = 12;
 
-/// The names of parts, for people.
-fn names(parts: &[Part]) -> String {
-    let names: Vec<&str> = parts.iter().take(NAMED).map(|p| p.name.as_str()).collect();
-    let more = parts.len() - names.len();
+/// Names for people.
+pub(super) fn listed(mut names: Vec<&str>) -> String {
+    let more = names.len().saturating_sub(NAMED);
+    names.truncate(NAMED);
     let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
     format!("{}{rest}", names.join(", "))
 }

@@ -50,6 +50,11 @@ impl Model {
         Self { parts: vec![part], eye: None, notes: Vec::new() }
     }
 
+    /// Of its parts.
+    pub fn names(&self) -> Vec<&str> {
+        self.parts.iter().map(|part| part.name.as_str()).collect()
+    }
+
     /// All parts as one that is no mirror.
     ///
     /// # Errors

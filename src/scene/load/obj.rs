@@ -21,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::geometry::mesh::MAX_COORDINATE;
 use crate::image::color::srgb_to_linear;
 use crate::scene::file::LIGHT_GREY;
+use crate::scene::library::listed;
 use crate::scene::materials::Material;
 
 const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
@@ -215,7 +216,7 @@ impl Paints {
             textures.notes.push(format!(
                 "{}: no material file has {}: shown without",
                 path.display(),
-                missing.join(", ")
+                listed(missing)
             ));
         }
         named.retain(|n| self.names.contains(&n.name));
