@@ -80,6 +80,15 @@ impl FrameReport {
         (searched > 0).then(|| steps as f64 / searched as f64)
     }
 
+    /// The one whose reflections took least.
+    ///
+    /// # Panics
+    /// If there are none.
+    pub fn fastest(reports: Vec<Self>) -> Self {
+        let by_time = |a: &Self, b: &Self| a.reflection_ms().total_cmp(&b.reflection_ms());
+        reports.into_iter().min_by(by_time).expect("at least one report")
+    }
+
     /// The last report with every time replaced by the median over all.
     ///
     /// # Panics

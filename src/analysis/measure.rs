@@ -1,4 +1,4 @@
-//! Times that can be trusted: sides that take turns with a reference, medians with quartiles, ratios pair by pair.
+//! Times that can be trusted: frames that alternate with those of a reference, medians with quartiles, ratios turn by turn.
 
 use crate::backend::Backend;
 use crate::camera::Eye;
@@ -132,8 +132,8 @@ pub struct Rounds {
     pub repeat: u32,
     /// Rounds before that: they fill caches and memory.
     pub warm_up: u32,
-    /// A turn has as many frames as fit into so many milliseconds, of which the fastest counts: a single frame is at the
-    /// mercy of whatever else the machine does, and that only ever makes it slower.
+    /// A turn has as many frames of each of its two as fit into so many milliseconds, of which the fastest counts: a single
+    /// frame is at the mercy of whatever else the machine does, and that only ever makes it slower.
     pub least_ms: f64,
     /// A turn has no fewer frames, unless they take more than [`LONG`] times `least_ms`.
     pub least_frames: u32,
@@ -147,13 +147,15 @@ pub const LEAST_TURNS: usize = 3;
 pub const LONG: f64 = 4.0;
 /// A turn has no more frames.
 const MOST_FRAMES: f64 = 32.0;
+/// No fewer of the reference: one before and one after a side's only frame.
+const LEAST_BESIDE: u32 = 2;
 
 /// What one side took, by turn.
 #[derive(Clone, Debug, Default)]
 pub struct Timed {
     /// Each of a turn's fastest frame.
     pub reports: Vec<FrameReport>,
-    /// Milliseconds of the reference's turns before and after each, their mean.
+    /// Milliseconds of the reference's fastest frame of the same turn.
     pub beside_ms: Vec<f64>,
 }
 
@@ -194,9 +196,10 @@ impl Timed {
     }
 }
 
-/// Measures sides against a reference, which has a turn before and after each of them: A B A C A, A B A C A. So a ratio is
-/// of neighbours in time, and what the machine does slowly cancels out. Returns the reference's times and each side's.
-/// `step` is told how much is done, 0 to 1, before each turn of a side.
+/// Measures sides against a reference. In a side's turn its frames alternate with those of the reference, A B A B, and the
+/// fastest of each count: so both had the same machine, whatever else ran on it. The sides take their turns one after the
+/// other, in rounds. Returns the reference's times, a turn of each side each, and the sides'. `step` is told how much is done,
+/// 0 to 1, before each turn.
 ///
 /// # Errors
 /// A backend failed, or `step` did.
@@ -209,48 +212,47 @@ pub fn against(
 ) -> Result<(Timed, Vec<Timed>)> {
     let mut timed = vec![Timed::default(); sides.len()];
     let mut own = Timed::default();
-    let (mut frames, mut own_frames) = (vec![1; sides.len()], 1);
+    let mut frames = vec![[1, LEAST_BESIDE]; sides.len()];
     let mut spent = vec![0.0; sides.len()];
     let total = rounds.warm_up + rounds.repeat;
     for round in 0..total {
-        let warm = round >= rounds.warm_up;
-        step(f64::from(round) / f64::from(total))?;
-        let mut before = turn(stages, reference, own_frames)?;
-        if !warm {
-            own_frames = frames_of(rounds, before.reflection_ms());
-        }
         for (i, side) in sides.iter().enumerate() {
             let done = f64::from(round) + i as f64 / sides.len() as f64;
             step(done / f64::from(total))?;
             if spent[i] > rounds.most_ms && timed[i].reports.len() >= LEAST_TURNS {
                 continue;
             }
-            let report = turn(stages, side, frames[i])?;
-            let ms = report.reflection_ms();
-            if !warm {
-                frames[i] = frames_of(rounds, ms);
+            let [report, beside] = turn(stages, [side, reference], frames[i])?;
+            let [ms, beside_ms] = [&report, &beside].map(FrameReport::reflection_ms);
+            if round < rounds.warm_up {
+                frames[i] = [frames_of(rounds, ms), frames_of(rounds, beside_ms).max(LEAST_BESIDE)];
                 continue;
             }
-            let after = turn(stages, reference, own_frames)?;
-            spent[i] += ms * f64::from(frames[i]);
-            timed[i].beside_ms.push(0.5 * (before.reflection_ms() + after.reflection_ms()));
+            spent[i] += ms * f64::from(frames[i][0]);
+            timed[i].beside_ms.push(beside_ms);
             timed[i].reports.push(report);
-            own.reports.push(std::mem::replace(&mut before, after));
-        }
-        if warm {
-            own.reports.push(before);
+            own.reports.push(beside);
         }
     }
     Ok((own, timed))
 }
 
-/// The fastest of so many frames of one side.
-fn turn(stages: &mut [Stage<'_>], side: &Side, frames: u32) -> Result<FrameReport> {
-    let stage = &mut stages[side.stage];
-    let reports: Result<Vec<FrameReport>> = (0..frames).map(|_| stage.run(side)).collect();
-    let by_time =
-        |a: &FrameReport, b: &FrameReport| a.reflection_ms().total_cmp(&b.reflection_ms());
-    Ok(reports?.into_iter().min_by(by_time).expect("a turn has frames"))
+/// The fastest of so many frames of two sides, which are spread evenly over the turn.
+fn turn(stages: &mut [Stage<'_>], sides: [&Side; 2], frames: [u32; 2]) -> Result<[FrameReport; 2]> {
+    let mut reports = [Vec::new(), Vec::new()];
+    for k in alternating(frames) {
+        reports[k].push(stages[sides[k].stage].run(sides[k])?);
+    }
+    Ok(reports.map(FrameReport::fastest))
+}
+
+/// 0 and 1 as often as said, each evenly spread.
+fn alternating(frames: [u32; 2]) -> Vec<usize> {
+    let place =
+        |k: usize| (0..frames[k]).map(move |i| ((f64::from(i) + 0.5) / f64::from(frames[k]), k));
+    let mut order: Vec<(f64, usize)> = place(0).chain(place(1)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order.into_iter().map(|(_, k)| k).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to MOST_FRAMES")]
@@ -291,6 +293,16 @@ mod tests {
         assert_eq!(Ratio::of(&[1.0, 2.0], &[1.0]).unwrap().of.n, 1);
         assert!(Ratio::of(&[0.0], &[0.0]).unwrap().noisy, "not a number");
         assert_eq!(Ratio::of(&[1.0], &[]), None);
+    }
+
+    #[test]
+    fn frames_of_a_turn_alternate() {
+        assert_eq!(alternating([1, 2]), [1, 0, 1]);
+        assert_eq!(alternating([2, 2]), [0, 1, 0, 1]);
+        assert_eq!(
+            alternating([2, 6]),
+            [1, 0, 1, 1, 1, 0, 1].iter().copied().chain([1]).collect::<Vec<_>>()
+        );
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec2};
 
+use crate::analysis::measure::Ratio;
 use crate::backend::Backend;
 use crate::camera::Eye;
 use crate::context::Context;
@@ -23,7 +24,7 @@ pub type MakeBackend<'a> = dyn Fn(usize, &dyn Method) -> Result<Box<dyn Backend>
 pub struct Effort {
     /// Rays a pixel of the reference.
     pub spp: u32,
-    /// Frames that are timed; the medians count.
+    /// Turns that are timed, each the fastest of a few frames; the medians count.
     pub repeat: u32,
     /// Frames of the orbit on which flicker is measured; fewer than three: it is not.
     pub frames: u32,
@@ -45,6 +46,8 @@ pub struct Reference {
 pub struct Measured {
     /// Times are medians.
     pub report: FrameReport,
+    /// The reflections' time by that of one ray a pixel, whose frames alternated with these.
+    pub to_one_ray: Ratio,
     /// Against the reference, where that reflects objects.
     pub errors: Comparison,
 }
@@ -129,13 +132,14 @@ pub fn compare_methods(
     cx.step("reference", 0.0)?;
     let reference = reference(scene, eye, effort.spp, cx)?;
     let places = Places::new(described);
+    let mut rays = Renderer::new();
     let mut entries = Vec::new();
     let count = candidates.len() as f64;
     for (i, candidate) in candidates.into_iter().enumerate() {
         cx.step(&candidate.label, i as f64 / count)?;
         let trial = Trial { scene, eye, effort, reference: &reference, places: &places, cx };
         let made = backend(i, candidate.method);
-        let result = match made.and_then(|backend| trial.draw(&candidate, backend)) {
+        let result = match made.and_then(|backend| trial.draw(&candidate, backend, &mut rays)) {
             Err(Error::Cancelled) => return Err(Error::Cancelled),
             result => result.map(Box::new),
         };
@@ -178,42 +182,65 @@ struct Trial<'a> {
     cx: &'a Context,
 }
 
+/// Frames of a turn of a method and of one ray a pixel, alternating.
+const FRAMES: usize = 3;
+
 impl Trial<'_> {
-    fn draw(&self, candidate: &Candidate, backend: Box<dyn Backend>) -> Result<Drawn> {
+    fn draw(
+        &self,
+        candidate: &Candidate,
+        backend: Box<dyn Backend>,
+        rays: &mut Renderer,
+    ) -> Result<Drawn> {
         let Candidate { method, ref params, knobs, .. } = *candidate;
-        let mut renderer = Renderer::on(backend);
-        renderer.keep_bright();
-        let measured = self.measure(&mut renderer, method, params)?;
-        let picture = renderer.picture().clone();
-        let planes = renderer.planes().expect("they were asked for").clone();
-        let settings = if knobs { self.turn(&mut renderer, candidate)? } else { Vec::new() };
-        let restlessness = self.orbit(&mut renderer, method, params)?;
+        let mut own = Renderer::on(backend);
+        own.keep_bright();
+        let measured = self.measure([&mut own, rays], method, params)?;
+        let picture = own.picture().clone();
+        let planes = own.planes().expect("they were asked for").clone();
+        let settings = if knobs { self.turn([&mut own, rays], candidate)? } else { Vec::new() };
+        let restlessness = self.orbit(&mut own, method, params)?;
         let displacement_px = self.places.displacement(self.scene, self.eye, &planes, self.cx)?;
         Ok(Drawn { measured, picture, planes, displacement_px, restlessness, settings })
     }
 
-    /// The last frame comes with its planes, and is not timed.
+    /// By the first renderer, in turn with one ray a pixel by the second. The last frame comes with its planes, and is not
+    /// timed.
     fn measure(
         &self,
-        renderer: &mut Renderer,
+        [own, rays]: [&mut Renderer; 2],
         method: &dyn Method,
         params: &Params,
     ) -> Result<Measured> {
-        let mut reports = Vec::new();
-        for _ in 0..=self.effort.repeat {
-            reports.push(renderer.render(self.scene, self.eye, method, params, false, self.cx)?);
+        let Self { scene, eye, cx, .. } = *self;
+        let one = crate::methods::method("raytrace").expect("it is in the registry");
+        let one_params = Params::defaults(one.info().params);
+        let (mut reports, mut beside) = (Vec::new(), Vec::new());
+        for turn in 0..=self.effort.repeat {
+            let mut frames = [Vec::new(), Vec::new()];
+            for _ in 0..FRAMES {
+                frames[0].push(own.render(scene, eye, method, params, false, cx)?);
+                frames[1].push(rays.render(scene, eye, one, &one_params, false, cx)?);
+            }
+            // The first one fills caches and compiles shaders.
+            if turn > 0 {
+                let [own, beside_own] = frames.map(FrameReport::fastest);
+                reports.push(own);
+                beside.push(beside_own.reflection_ms());
+            }
         }
-        // The first one fills caches and compiles shaders.
-        let mut report = FrameReport::median(&reports[1..]);
-        let last = renderer.render(self.scene, self.eye, method, params, true, self.cx)?;
+        let mut report = FrameReport::median(&reports);
+        let times: Vec<f64> = reports.iter().map(FrameReport::reflection_ms).collect();
+        let to_one_ray = Ratio::of(&times, &beside).expect("there is a turn");
+        let last = own.render(scene, eye, method, params, true, cx)?;
         report.valid = last.valid;
-        let own = Side { picture: renderer.picture(), planes: renderer.planes() };
+        let shown = Side { picture: own.picture(), planes: own.planes() };
         let truth = Side { picture: &self.reference.picture, planes: Some(&self.reference.planes) };
-        Ok(Measured { report, errors: compare(own, truth, &Set::Objects)? })
+        Ok(Measured { report, to_one_ray, errors: compare(shown, truth, &Set::Objects)? })
     }
 
     /// Each quality knob, one at a time.
-    fn turn(&self, renderer: &mut Renderer, candidate: &Candidate) -> Result<Vec<Setting>> {
+    fn turn(&self, [own, rays]: [&mut Renderer; 2], candidate: &Candidate) -> Result<Vec<Setting>> {
         let method = candidate.method;
         let mut settings = Vec::new();
         for knob in method.info().params.iter().filter(|p| p.is_quality_knob) {
@@ -221,7 +248,7 @@ impl Trial<'_> {
             for &value in values.flat_map(|(_, values)| *values) {
                 let mut params = candidate.params.clone();
                 params.set(knob, value)?;
-                let measured = self.measure(renderer, method, &params)?;
+                let measured = self.measure([&mut *own, &mut *rays], method, &params)?;
                 settings.push(Setting { knob: knob.id, value: value.to_owned(), measured });
             }
         }

@@ -31,7 +31,7 @@ pub(crate) struct BenchArgs {
 /// What to measure.
 #[derive(Subcommand, Debug)]
 enum What {
-    /// The reflected layer against ray tracing the same pixels, one ray each, interleaved A B A B
+    /// The reflected layer against ray tracing the same pixels, one ray each; their frames alternate
     ///
     /// The layer is everything from the list of visible triangles to resolved colours: patches, cameras,
     /// culling, projection, splatting, resolve and clear. The rays are traced by the best triangle BVH that we

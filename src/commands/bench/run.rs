@@ -300,8 +300,9 @@ pub(super) fn head(args: &RunArgs, title: &str) -> Head {
         (
             "Method",
             format!(
-                "a reference has a turn before and after each side (A B A C A), {} turns after {} to warm up, each the fastest of at least {} \
-                 frames and {:.0} ms; medians; ratios are turn by turn; ~ marks ratios whose quartiles are more than 10 % apart",
+                "frames of each side alternate with those of a reference (A B A B), {} turns after {} to warm up, each the fastest of at \
+                 least {} frames and {:.0} ms of both; medians; ratios are turn by turn; ~ marks ratios whose quartiles are more than \
+                 10 % apart",
                 rounds.repeat, rounds.warm_up, rounds.least_frames, rounds.least_ms
             ),
         ),

@@ -22,7 +22,7 @@ const TESTS: [&str; 4] = ["interval", "paper", "sweep", "slab"];
 /// Surfels a leaf; so small that the least total is not at an end, where projection is dear.
 const LEAVES: [u32; 12] = [2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096];
 /// Where each frame takes long.
-const FEW_LEAVES: [u32; 6] = [2, 8, 32, 128, 512, 4096];
+const FEW_LEAVES: [u32; 7] = [1, 2, 8, 32, 128, 512, 4096];
 
 /// What one side of the sweep took.
 struct Point {

@@ -137,7 +137,7 @@ pub(super) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
 
 fn map(bench: Bench<'_>, described: &Scene, surfels: usize) -> anyhow::Result<Option<Map>> {
     let wanted = bench.pick(&[2_000, 8_000, 32_000, 128_000][..], &[2_000, 32_000]);
-    let shares = bench.pick(&[0.25, 0.5, 1.0, 2.0][..], &[0.25, 1.0]);
+    let shares = bench.pick(&[0.25, 0.5, 1.0][..], &[0.25, 1.0]);
     let sizes: Vec<ImageSize> =
         shares.iter().map(|&share| scaled(bench.args.place.size, share)).collect();
     let (mut triangles, mut cells) = (Vec::new(), Vec::new());

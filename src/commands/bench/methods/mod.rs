@@ -20,6 +20,7 @@ use serde_json::{Value, json};
 
 use super::super::render::{HowArgs, where_it_ran};
 use super::super::{Ready, SceneArgs, check_folder, check_json, ms, say, write_json};
+use super::report::{ratio, times};
 
 /// See [`super::What::Methods`].
 #[derive(Args, Debug)]
@@ -39,7 +40,7 @@ pub(crate) struct MethodsArgs {
     #[arg(long, value_name = "N", default_value_t = 256, allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=65_536))]
     spp: u32,
-    /// Frames that are timed; medians count
+    /// Turns that are timed, each the fastest of three frames that alternate with one ray a pixel; medians count
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=1_000))]
     repeat: u32,
@@ -147,10 +148,10 @@ fn own_ms(measured: &Measured) -> Option<f64> {
 fn table(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> String {
     let mut text = format!(
         "# Methods on {} ({} x {}), against {} rays a pixel\n\n\
-         Errors are over the pixels that reflect objects. Times are medians of {} frames; `reflection` is everything but \
-         visibility and the direct view. Displacement: how far what a pixel shows is from where it belongs.\n\n\
-         | method | runs on | reflection ms | projection ms | steps | RMSE | PSNR dB | FLIP | missing % | displacement px, median / 95 % / 99 % | flicker |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|\n",
+         Errors are over the pixels that reflect objects. Times are medians of {} turns, each the fastest of \
+         three frames that alternate with one ray a pixel; `reflection` is everything but visibility and the direct view. Displacement: how far what a pixel shows is from where it belongs.\n\n\
+         | method | runs on | reflection ms | to 1 ray | projection ms | steps | RMSE | PSNR dB | FLIP | missing % | displacement px, median / 95 % / 99 % | flicker |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|\n",
         ready.scene.name, ready.eye.size.width, ready.eye.size.height, args.spp, args.repeat
     );
     let number = |value: Option<f64>, digits: usize| {
@@ -159,9 +160,9 @@ fn table(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> String {
     for entry in entries {
         let id = &entry.candidate.label;
         let row = match &entry.result {
-            Err(_) => format!("| {id} | refused | – | – | – | – | – | – | – | – | – |"),
+            Err(_) => format!("| {id} | refused | – | – | – | – | – | – | – | – | – | – |"),
             Ok(drawn) => {
-                let Measured { report, errors } = &drawn.measured;
+                let Measured { report, to_one_ray, errors } = &drawn.measured;
                 let missing = errors.objects.as_ref().map(|o| 100.0 * o.total.missing_share());
                 let px = drawn
                     .displacement_px
@@ -169,9 +170,10 @@ fn table(ready: &Ready, args: &MethodsArgs, entries: &[Entry]) -> String {
                         format!("{median:.2} / {p95:.2} / {p99:.2}")
                     });
                 format!(
-                    "| {id} | {} | {} | {} | {} | {:.4} | {} | {:.4} | {} | {px} | {} |",
+                    "| {id} | {} | {} | {} | {} | {} | {:.4} | {} | {:.4} | {} | {px} | {} |",
                     where_it_ran(report),
                     number(own_ms(&drawn.measured), 1),
+                    times(Some(*to_one_ray)),
                     number(report.project_ms, 1),
                     number(report.mean_steps(), 1),
                     errors.rmse,
@@ -230,6 +232,7 @@ fn measured_figures(measured: &Measured) -> Value {
             "composite": ms(report.composite_ms),
             "frame": ms(report.frame_ms),
         },
+        "ratio_to_1_ray": ratio(Some(measured.to_one_ray)),
         "projections": report.projections,
         "valid": report.valid,
         "mean_steps": report.mean_steps(),

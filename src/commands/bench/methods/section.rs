@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::super::super::render::HowArgs;
 use super::super::super::{Ready, SceneArgs};
-use super::super::report::{Block, Image, Plot, Section, Table, number};
+use super::super::report::{Block, Image, Plot, Section, Table, number, ratios, times};
 use super::super::run::Bench;
 use super::{MethodsArgs, figures, plot, sheet};
 
@@ -36,7 +36,8 @@ pub(crate) fn section(bench: Bench<'_>) -> anyhow::Result<Section> {
     let blocks = vec![
         Block::Text(format!(
             "Every method that can draw the scene, held against {} rays a pixel where objects are reflected. Reflection is \
-             everything but visibility and the direct view; times are medians of {} frames, one method after the other.",
+             everything but visibility and the direct view; times are medians of {} turns, each the fastest of three frames that \
+             alternate with one ray a pixel.",
             args.spp, args.repeat
         )),
         Block::Plot(Plot {
@@ -97,6 +98,7 @@ fn table(figures: &Value) -> Table {
             "method",
             "runs on",
             "reflection ms",
+            "to 1 ray",
             "RMSE",
             "FLIP",
             "missing %",
@@ -120,6 +122,7 @@ fn table(figures: &Value) -> Table {
             name,
             method["backend"].as_str().unwrap_or_default().to_owned(),
             at(&method["ms"]["reflection"], 1.0),
+            times(ratios(&method["ratio_to_1_ray"]).first().map(|found| found.1)),
             method["rmse"].as_f64().map_or("–".into(), |x| format!("{x:.4}")),
             method["flip"].as_f64().map_or("–".into(), |x| format!("{x:.4}")),
             at(&method["missing"], 100.0),
