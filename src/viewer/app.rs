@@ -260,6 +260,12 @@ impl Viewer {
         self.worker.load(LoadRequest { what, prepare, mirror_triangles, memory });
     }
 
+    /// Ends the load under way. Should it be ready in this very moment, it is shown all the same.
+    pub(super) fn cancel_load(&mut self) {
+        self.worker.cancel_load();
+        self.tell("loading was cancelled".to_owned(), false);
+    }
+
     /// The scene as it is seen now.
     pub(super) fn as_placed(&self) -> Option<Scene> {
         let mut scene = (**self.scene.as_ref()?).clone();

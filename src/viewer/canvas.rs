@@ -205,11 +205,16 @@ fn fly(viewer: &mut Viewer, ui: &egui::Ui) {
 }
 
 /// What happens, and what went wrong.
-fn hints(viewer: &mut Viewer, ui: &egui::Ui, rect: Rect) {
+fn hints(viewer: &mut Viewer, ui: &mut egui::Ui, rect: Rect) {
     let painter = ui.painter_at(rect);
     if let Some((stage, done)) = &viewer.progress {
         let what = format!("{stage} {:.0} %", 100.0 * done);
         text(&painter, rect.left_top() + vec2(12.0, 12.0), Align2::LEFT_TOP, &what, Color32::WHITE);
+        let place = Rect::from_min_size(rect.left_top() + vec2(12.0, 40.0), vec2(70.0, 22.0));
+        let button = ui.put(place, egui::Button::new("cancel"));
+        if button.on_hover_text("Ends loading; what is shown stays").clicked() {
+            viewer.cancel_load();
+        }
     } else if viewer.prepared.is_none() && viewer.message.is_none() {
         text(&painter, rect.center(), Align2::CENTER_CENTER, "loading …", Color32::WHITE);
     }

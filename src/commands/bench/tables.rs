@@ -286,7 +286,7 @@ fn table_2(rows: &[Measured]) -> Table {
     for row in rows {
         let Published { scene, total_ms, cull_ms, project_ms, valid_percent, .. } = row.paper;
         table.row(vec![
-            format!("{},000", row.paper.points_k),
+            (row.paper.points_k * 1000).to_string(),
             format!("the paper's ({scene})"),
             number(*total_ms),
             number(*cull_ms),

@@ -260,6 +260,30 @@ fn methods_are_changed_and_compared() {
 }
 
 #[test]
+fn loading_is_cancelled_by_its_button() {
+    let (_folder, path) = small();
+    let mut hands = opened(&path, [400.0, 300.0], without_panel());
+    hands.step();
+    until_drawn(&mut hands);
+    assert!(hands.query_by_label("cancel").is_none());
+    // Seconds of work.
+    viewer_mut(&mut hands).prepare.surfels = 10_000_000;
+    viewer_mut(&mut hands).prepare_again();
+    until(&mut hands, "progress", |v| v.progress.is_some());
+    hands.step();
+    hands.get_by_label("cancel").click();
+    until(&mut hands, "the end", |v| v.progress.is_none());
+    let shown = viewer(&hands).prepared.as_ref().expect("something stays");
+    assert!(shown.surfels < 1_000_000, "{} surfels", shown.surfels);
+    let said = viewer(&hands).message.as_ref().map(|m| m.0.as_str());
+    assert_eq!(said, Some("loading was cancelled"));
+    // The next load is none of it.
+    viewer_mut(&mut hands).prepare.surfels = 30_000;
+    viewer_mut(&mut hands).prepare_again();
+    until_drawn(&mut hands);
+}
+
+#[test]
 fn small_and_large_windows_are_drawn() {
     let (_folder, path) = small();
     let mut hands = opened(&path, [200.0, 150.0], Settings::default());

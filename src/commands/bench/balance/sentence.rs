@@ -59,7 +59,12 @@ pub(super) fn optimum(
             ));
         }
         (None, Some(large)) => text.push_str(&format!(
-            " That is the smallest leaf of the sweep, so the optimum may lie below it: with leaves of {} {}.",
+            " {}: with leaves of {} {}.",
+            if best.leaf == 1 {
+                "No leaf is smaller: projection is so dear that culling each point by itself pays"
+            } else {
+                "That is the smallest leaf of the sweep, so the optimum may lie below it"
+            },
             large.leaf,
             change(large)
         )),
@@ -150,6 +155,10 @@ mod tests {
         let text = said(1000.0);
         assert!(text.contains("leaves of 256") && text.contains("dear culling"), "{text}");
         assert!(said(0.1).contains("smallest leaf of the sweep"));
+        let mut points = sweep(0.1);
+        points[0].leaf = 1;
+        let text = optimum("gpu", "slab", Balance::of(&points).unwrap(), &points);
+        assert!(text.contains("leaves of 1") && text.contains("No leaf is smaller"), "{text}");
         assert!(said(1e9).contains("largest leaf of the sweep"));
     }
 
