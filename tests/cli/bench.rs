@@ -30,7 +30,7 @@ fn the_papers_tables() {
     let folder = Folder::new();
     let line = TINY.replace("--max 4000", "--max 20000");
     let run = folder.good(&format!("bench tables {line} -o found --json f.json"));
-    assert!(run.out.contains("| 10,000 | the paper's (Dinosaur) | 48.0 | 25.0 | 23.0 | 19.0 |"));
+    assert!(run.out.contains("| 10000 | the paper's (Dinosaur) | 48.0 | 25.0 | 23.0 | 19.0 |"));
     let figures = folder.json("f.json");
     assert_eq!(folder.json("found/report.json"), figures);
     for key in ["version", "date", "machine", "repeat", "seed", "quick", "ratios"] {

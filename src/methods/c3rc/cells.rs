@@ -23,8 +23,9 @@ use crate::visibility::{MirrorTriangleIndex, OwnPixels, Patch, PixelRect};
 const TILE_PX: u32 = 32;
 /// The same for indices.
 const TILE: usize = TILE_PX as usize;
-/// How far points of the mirror may lie from a cell's plane, in pixels (untuned).
-const SURFACE_TOLERANCE_PX: f32 = 2.0;
+/// How far points of the mirror may lie from a cell's plane, in pixels. Measured: from 2 to a half errors fall by 2 to 6 % at no
+/// cost, as boxes are refused sooner; below that cells become more, and errors hardly less.
+const SURFACE_TOLERANCE_PX: f32 = 0.5;
 /// What a tile sees is bounded by a fit to its rays that is no farther off than this, in pixels.
 const GLANCE_PX: f32 = 12.0;
 /// How much farther off the rays may be that were not looked at.
