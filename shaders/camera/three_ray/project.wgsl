@@ -29,14 +29,14 @@ fn size_of(v: vec3<f32>) -> f32 {
     return abs(v.x) + abs(v.y) + abs(v.z);
 }
 
-/// What rounding may add to the cubic of `q` at λ.
+/// How far from zero the cubic of `q` may turn round at λ and still have a double root: by rounding, and within the disk.
 fn noise(camera: u32, q: vec3<f32>, lambda: f32) -> f32 {
-    let n0 = size_of(row(camera + N0).xyz);
-    let n1 = size_of(row(camera + N1).xyz);
-    let n2 = size_of(row(camera + N2).xyz);
-    let normal = lambda * (lambda * n2 + n1) + n0;
+    let n0 = row(camera + N0).xyz;
+    let n1 = row(camera + N1).xyz;
+    let n2 = row(camera + N2).xyz;
+    let normal = lambda * (lambda * size_of(n2) + size_of(n1)) + size_of(n0);
     let reach = size_of(q) + abs(lambda) * size_of(row(camera + D1).xyz);
-    return normal * reach * NOISE;
+    return normal * reach * NOISE + length(lambda * (lambda * n2 + n1) + n0) * row(camera + V1).w;
 }
 
 /// Narrows λ to where v1 + `q` can have an image in the grown camera.

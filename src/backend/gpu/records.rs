@@ -302,7 +302,7 @@ pub(super) fn camera_rows(c: &CameraInstance) -> [Row; CAMERA_ROWS] {
     let t = &c.camera;
     let [base, per_lambda] = c.per_px;
     [
-        three(t.v1, 0.0),
+        three(t.v1, t.disk),
         three(t.d1, c.radius),
         three(t.e1, c.extent),
         three(t.e2, flag(c.gaze.is_some())),

@@ -94,6 +94,9 @@ pub struct ThreeRay<T> {
     pub per_axis: [T; 4],
     /// The directions open so wide that the axis bounds nothing.
     pub wide: bool,
+    /// Points stand for disks of this radius: where the disk reaches the caustic and the point lies beyond it, its image is
+    /// on the caustic. 0 for points proper.
+    pub disk: T,
 }
 
 /// Directions whose component along the axis is less than this share of their length make a camera `wide`
@@ -130,6 +133,7 @@ impl<T: Scalar> ThreeRay<T> {
             start: corner.map(|i| T::from_f64(axis.dot(grown.origins[i] - v1))),
             per_axis: corner.map(|i| T::from_f64(if wide { 0.0 } else { 1.0 / along[i] })),
             wide,
+            disk: T::from_f64(0.0),
         }
     }
 }

@@ -58,8 +58,9 @@ impl<T: Scalar> ThreeRay<T> {
         }
     }
 
-    /// What the rounding of the constants and of F's evaluation may add to F(λ) of `q`: a double root is on a caustic, where
-    /// that decides whether there are two images or none.
+    /// How far from zero F(λ) of `q` may turn round and still have a double root, which is on the caustic: what the rounding of
+    /// the constants and of its evaluation may add to it, and what lies within the disk, as F is the distance from T(λ)'s plane
+    /// times |N(λ)|.
     #[inline(always)]
     fn noise<R: Real<Scalar = T>>(&self, q: [R; 3], lambda: R) -> R {
         let size = |v: [T; 3]| {
@@ -68,7 +69,8 @@ impl<T: Scalar> ThreeRay<T> {
         };
         let normal = lambda * (lambda * size(self.n2) + size(self.n1)) + size(self.n0);
         let reach = q[0].abs() + q[1].abs() + q[2].abs() + lambda.abs() * size(self.d1);
-        normal * reach * T::from_f64(NOISE_ROUNDINGS * T::ROUNDING)
+        let n = [0, 1, 2].map(|k| lambda * (lambda * self.n2[k] + self.n1[k]) + self.n0[k]);
+        normal * reach * T::from_f64(NOISE_ROUNDINGS * T::ROUNDING) + dot(n, n).sqrt() * self.disk
     }
 
     /// Narrows `lo..hi` to where v1 + `q` can have an image in the grown triangle.

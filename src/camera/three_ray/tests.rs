@@ -2,6 +2,7 @@
 
 mod caustics;
 mod counts;
+mod disks;
 mod mirrors;
 mod slope;
 mod subdivision;

@@ -291,7 +291,15 @@ pub(super) fn of_view(
             out.push(CameraInstance {
                 patch: index,
                 object: u32::try_from(object).expect("fewer than 2^32 objects"),
-                camera: grown.camera(&own),
+                camera: ThreeRay {
+                    // What hides is best left out where it is not certain.
+                    disk: if settings.shape == SplatShape::Ellipse && !hides {
+                        EVENNESS * cloud.extent
+                    } else {
+                        0.0
+                    },
+                    ..grown.camera(&own)
+                },
                 volume: grown.volume(&own),
                 lambda: range,
                 several: several.map_or([1.0, 0.0], |(a, b)| [a as f32, b as f32]),

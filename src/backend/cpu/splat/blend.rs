@@ -91,12 +91,19 @@ impl Layers {
             self.colors.push(radiance[surfel as usize]);
         }
         self.order.sort_unstable();
+        let mut last = None;
         for n in 0..self.order.len() {
             if n % UNTIL_FULL == 0 && n > 0 && self.is_full(simd) {
                 break;
             }
             #[expect(clippy::cast_possible_truncation, reason = "the low half")]
             let i = self.order[n] as u32 as usize;
+            // Two images of a point at one place, on the caustic, are one.
+            let one = (hits.depth[i].to_bits(), hits.surfel[i]);
+            if last == Some(one) {
+                continue;
+            }
+            last = Some(one);
             let shows = hits.surfel[i] < first_hider;
             self.splat(simd, hits, i, self.colors[i], shows);
         }
@@ -323,6 +330,20 @@ mod tests {
 
     fn is(blended: Option<Blended>, r: f32, g: f32, b: f32, coverage: f32) -> bool {
         blended.unwrap().value.abs_diff_eq(Vec4::new(r, g, b, coverage), 1e-6)
+    }
+
+    #[test]
+    fn two_images_at_one_place_are_one() {
+        let middle = [2.5, 2.5, 1.0, 0.25 / GAIN, 1.0];
+        let mut twice = hits(&[middle, middle]);
+        let count = |hits: &Hits| {
+            let (mut layers, tile) = (Layers::default(), tile());
+            dispatch!(simd_level(), simd => layers.draw(simd, hits, &COLORS, 9, 5, &tile));
+            layers.at(SLOT).unwrap().value.w
+        };
+        assert!((count(&twice) - 0.5).abs() < 1e-6, "two surfels are two");
+        twice.surfel[1] = 0;
+        assert!((count(&twice) - 0.25).abs() < 1e-6);
     }
 
     #[test]
