@@ -23,8 +23,8 @@ use crate::visibility::{MirrorTriangleIndex, OwnPixels, Patch, PixelRect};
 const TILE_PX: u32 = 32;
 /// The same for indices.
 const TILE: usize = TILE_PX as usize;
-/// How far points of the mirror may lie from a cell's plane, in pixels. Measured: from 2 to a half errors fall by 2 to 6 % at no
-/// cost, as boxes are refused sooner; below that cells become more, and errors hardly less.
+/// How far points of the mirror may lie from a cell's plane, in pixels. Measured: from 2 to a half errors fall by 2 to 6 % at
+/// next to no cost, as boxes are refused sooner; below that cells become more, and errors hardly less.
 const SURFACE_TOLERANCE_PX: f32 = 0.5;
 /// What a tile sees is bounded by a fit to its rays that is no farther off than this, in pixels.
 const GLANCE_PX: f32 = 12.0;
