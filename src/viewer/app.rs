@@ -26,6 +26,9 @@ use crate::scene::prepared::PrepareOptions;
 
 /// After so long without a change, pictures are full again and shadows follow.
 const REST: Duration = Duration::from_millis(120);
+/// When to show what has arrived: egui paints once for a delay and twice for none, and where there is no graphics card the
+/// second painting takes time from the next picture.
+const SOON: Duration = Duration::from_nanos(1);
 /// What a picture may take while something moves, milliseconds.
 const BUDGET_MS: f64 = 33.0;
 /// Pictures shrink by no more than this per axis while something moves.
@@ -110,7 +113,7 @@ impl Viewer {
     /// Starts loading.
     pub(super) fn new(context: &egui::Context, opening: &Opening, settings: Settings) -> Self {
         let waker = context.clone();
-        let mut worker = Worker::new(move || waker.request_repaint());
+        let mut worker = Worker::new(move || waker.request_repaint_after(SOON));
         worker.load(LoadRequest {
             what: What::Request(Box::new(opening.request.clone())),
             prepare: opening.prepare,
@@ -426,7 +429,7 @@ impl Viewer {
         let since = self.changed.elapsed();
         let rest = self.posted.is_none() || since >= REST;
         let view = if rest { self.wanted(true, 1.0) } else { self.wanted(false, self.scale()) };
-        if !rest {
+        if !rest && !self.steady {
             context.request_repaint_after(REST - since);
         }
         // While something moves, only that is news.

@@ -50,8 +50,10 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
 
 fn paint(viewer: &Viewer, ui: &egui::Ui, rect: Rect) {
     let painter = ui.painter_at(rect);
-    painter.rect_filled(rect, 0.0, ui.visuals().extreme_bg_color);
-    let Some(display) = &viewer.display else { return };
+    let Some(display) = &viewer.display else {
+        painter.rect_filled(rect, 0.0, ui.visuals().extreme_bg_color);
+        return;
+    };
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     let image = |texture: &egui::TextureHandle, part: Rect| {
         let at = Rect::from_min_max(

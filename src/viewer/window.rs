@@ -42,6 +42,8 @@ pub fn run(opening: &Opening, cx: &Context) -> Result<Option<Outcome>> {
     let options = eframe::NativeOptions {
         viewport: builder,
         persist_window: !opening.is_measurement() && opening.size.is_none(),
+        // Pictures are shown as they were made.
+        dithering: false,
         ..eframe::NativeOptions::default()
     };
     let left = Left::default();
