@@ -52,7 +52,7 @@ impl Surface {
     }
 
     fn mesh(&self) -> SurfaceMesh<'_> {
-        SurfaceMesh { positions: &self.positions, triangles: &self.triangles }
+        SurfaceMesh { positions: &self.positions, triangles: &self.triangles, encloses: None }
     }
 }
 

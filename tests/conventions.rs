@@ -45,7 +45,7 @@ fn pixel_0_0_is_at_the_top_left() {
 
     // A mirror in the corner to the left and up is seen in the first pixel, and not in the last ones.
     let corner = [Vec3::new(-9.0, -4.0, 0.0), Vec3::new(4.0, 9.0, 0.0), Vec3::new(-9.0, 9.0, 0.0)];
-    let mirror = SurfaceMesh { positions: &corner, triangles: &[[0, 1, 2]] };
+    let mirror = SurfaceMesh { positions: &corner, triangles: &[[0, 1, 2]], encloses: None };
     let mut seen = Visibility::default();
     seen.update(&eye, &[mirror], &[], &mut Scratch::default());
     let id = |x: u32, y: u32| seen.mirror_ids[(y * SIZE.width + x) as usize];

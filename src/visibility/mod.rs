@@ -3,9 +3,10 @@
 //!
 //! The data flow, led by `raster`: `project` moves the corners onto a fixed-point picture plane and clips the
 //! triangles that leave it, `tiles` sorts them, `fill` decides the samples. Apart from that, `weights` says
-//! where on a triangle a view ray meets it.
+//! where on a triangle a view ray meets it, and `mirror_rays` how the mirrors' pixels send their rays on.
 
 mod fill;
+pub(crate) mod mirror_rays;
 mod patches;
 mod project;
 mod raster;
@@ -16,6 +17,7 @@ use glam::Vec3;
 
 use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
+use crate::geometry::Aabb;
 
 pub use patches::{Cell, MirrorTriangleIndex, OwnPixels, Patch, PatchScratch, PixelRect, patches};
 pub use project::MAX_SIDE;
@@ -39,6 +41,9 @@ pub struct SurfaceMesh<'a> {
     pub positions: &'a [Vec3],
     /// Vertex indices of each triangle; both of its sides are visible.
     pub triangles: &'a [[u32; 3]],
+    /// Of a surface that encloses something, with its triangles counter-clockwise from outside: a box that holds it. From outside
+    /// of that, sides that are seen from behind are hidden by others and left out.
+    pub encloses: Option<Aabb>,
 }
 
 impl SurfaceMesh<'_> {

@@ -54,7 +54,9 @@ pub(super) fn draw(
     let grid = Grid::new(eye.size);
     let triangles: usize = surfaces.iter().map(|s| s.triangles.len()).sum();
     chunks.resize_with(triangles.div_ceil(CHUNK), Chunk::default);
-    let source = Source { projection, surfaces: &surfaces, corners, first_corners };
+    let outside = |s: &SurfaceMesh| s.encloses.is_some_and(|held| !held.contains(eye.position));
+    let fronts_only = surfaces.iter().map(outside).collect();
+    let source = Source { projection, surfaces: &surfaces, corners, first_corners, fronts_only };
     chunks.par_iter_mut().enumerate().for_each(|(i, chunk)| {
         let first = i * CHUNK;
         dispatch!(*level, _simd => {

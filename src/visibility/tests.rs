@@ -36,7 +36,7 @@ impl Soup {
     }
 
     fn mesh(&self) -> SurfaceMesh<'_> {
-        SurfaceMesh { positions: &self.positions, triangles: &self.triangles }
+        SurfaceMesh { positions: &self.positions, triangles: &self.triangles, encloses: None }
     }
 }
 
@@ -155,7 +155,7 @@ fn closed_meshes_have_no_cracks() {
         [(64, 32, [0.0, 3.0, 0.0]), (700, 400, [1.0, 2.0, 2.5]), (9, 5, [0.3, -3.0, 0.4])]
     {
         let (positions, triangles) = sphere(Vec3::ZERO, columns, rows);
-        let mesh = SurfaceMesh { positions: &positions, triangles: &triangles };
+        let mesh = SurfaceMesh { positions: &positions, triangles: &triangles, encloses: None };
         let eye = eye(from, [0.0; 3], 151, 101);
         let visibility = seen(&eye, &[], &[mesh]);
         let distance = DVec3::from(from).length();
@@ -240,7 +240,7 @@ fn ground_ends_at_the_horizon() {
             triangles.push([i, i + cells + 1, i + 1]);
             triangles.push([i + 1, i + cells + 1, i + cells + 2]);
         }
-        let ground = SurfaceMesh { positions: &corners, triangles: &triangles };
+        let ground = SurfaceMesh { positions: &corners, triangles: &triangles, encloses: None };
         // The near plane is a millionth of the diagonal: 0.28.
         let eye = eye([0.3, 1.0, 0.7], [3.0, 1.0, -8.0], 160, 120);
         let visibility = seen(&eye, &[ground], &[]);
@@ -276,7 +276,7 @@ fn equal_depth_goes_to_the_lower_id_and_nan_nowhere() {
 #[test]
 fn same_bits_for_any_threads_and_instructions() {
     let (positions, triangles) = sphere(vec3(0.2, 0.1, 0.0), 300, 200);
-    let mirror = SurfaceMesh { positions: &positions, triangles: &triangles };
+    let mirror = SurfaceMesh { positions: &positions, triangles: &triangles, encloses: None };
     let mut random = Random(7);
     let soup = Soup::new((0..300).map(|i| {
         let place = random.point() * 3.0;
@@ -349,4 +349,31 @@ fn weights_give_the_point_on_the_ray() {
     assert_eq!(behind, 0);
     let past = [vec3(0.0, 0.0, 5.0), vec3(1.0, 0.0, 5.0), vec3(0.0, 1.0, 5.0)];
     assert_eq!(barycentrics(&eye, past, vec2(320.0, 240.0)), None);
+}
+
+#[test]
+fn backs_of_what_encloses_something_are_left_out_from_outside_only() {
+    let (positions, triangles) = sphere(Vec3::ZERO, 24, 12);
+    let surface =
+        |encloses| SurfaceMesh { positions: &positions, triangles: &triangles, encloses };
+    let outside = eye([0.0, 0.4, 3.0], [0.0, 0.0, 0.0], 60, 40);
+    let inside = eye([0.0, 0.1, 0.2], [0.3, 0.0, 1.0], 60, 40);
+    let held = Some(Aabb::of(positions.iter().copied()));
+    for eye in [&outside, &inside] {
+        let all = seen(eye, &[], &[surface(None)]);
+        assert!(all.samples.iter().flatten().any(|id| *id != NONE_ID));
+        assert_eq!(seen(eye, &[], &[surface(held)]).samples, all.samples);
+    }
+    // Its backs alone are nothing to see from outside.
+    let back = |t: &&[u32; 3]| {
+        let [a, b, c] = t.map(|i| positions[i as usize]);
+        (b - a).cross(c - a).dot(outside.position - a) < 0.0
+    };
+    let backs: Vec<[u32; 3]> = triangles.iter().filter(back).copied().collect();
+    let shown = |encloses| {
+        let surface = SurfaceMesh { positions: &positions, triangles: &backs, encloses };
+        seen(&outside, &[], &[surface]).samples.iter().flatten().filter(|id| **id != NONE_ID).count()
+    };
+    assert!(shown(None) > 100);
+    assert_eq!(shown(held), 0);
 }

@@ -30,6 +30,8 @@ pub(super) struct Source<'a> {
     pub(super) surfaces: &'a [SurfaceMesh<'a>],
     pub(super) corners: &'a [Corner],
     pub(super) first_corners: &'a [usize],
+    /// By surface: whether what is seen from behind is hidden anyway.
+    pub(super) fronts_only: Vec<bool>,
 }
 
 /// The tiles of a picture.
@@ -159,9 +161,9 @@ fn may_show(extremes: Extremes) -> bool {
 }
 
 impl ScreenTriangle {
-    /// Turned counter-clockwise; `None` if it shows at no sample of the picture.
+    /// Turned counter-clockwise; `None` if it shows at no sample of the picture, or only its back while `fronts_only`.
     #[inline(always)]
-    fn new([a, b, c]: [Corner; 3], id: u32, grid: &Grid) -> Option<Self> {
+    fn new([a, b, c]: [Corner; 3], id: u32, grid: &Grid, fronts_only: bool) -> Option<Self> {
         let extremes = extremes([a.x, b.x, c.x], [a.y, b.y, c.y]);
         if !may_show(extremes) {
             return None;
@@ -170,7 +172,8 @@ impl ScreenTriangle {
         let (abx, aby) = (i64::from(b.x - a.x), i64::from(b.y - a.y));
         let (acx, acy) = (i64::from(c.x - a.x), i64::from(c.y - a.y));
         let area = abx * acy - acx * aby;
-        if pixels.is_empty() || area == 0 {
+        // Fronts are counter-clockwise, where y points up.
+        if pixels.is_empty() || area == 0 || (fronts_only && area > 0) {
             return None;
         }
         let (b, c) = if area < 0 { (c, b) } else { (b, c) };
@@ -231,16 +234,17 @@ impl Chunk {
             let start = ids.start.clamp(surface_ids.start, surface_ids.end);
             let end = ids.end.clamp(surface_ids.start, surface_ids.end);
             let corners = &source.corners[source.first_corners[i]..];
+            let fronts = source.fronts_only[i];
             let own = &surface.triangles[start - surface_ids.start..end - surface_ids.start];
             for (indices, id) in own.iter().zip(super::id(start)..) {
                 let corners = indices.map(|i| corners[i as usize]);
                 let outside = corners.map(|c| c.outside);
                 if outside[0] | outside[1] | outside[2] == 0 {
-                    self.triangles.extend(ScreenTriangle::new(corners, id, grid));
+                    self.triangles.extend(ScreenTriangle::new(corners, id, grid, fronts));
                 } else if outside[0] & outside[1] & outside[2] == 0 {
                     let points = indices.map(|i| surface.positions[i as usize]);
                     source.projection.clipped(points, |corners| {
-                        self.triangles.extend(ScreenTriangle::new(corners, id, grid));
+                        self.triangles.extend(ScreenTriangle::new(corners, id, grid, fronts));
                     });
                 }
             }

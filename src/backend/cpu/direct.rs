@@ -12,7 +12,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use self::painter::Painter;
-pub use self::spots::{Colors, CornerValues, LANES, LIT_VALUES, Spots, VALUES};
+pub use self::spots::{Colors, CornerValues, LANES, Spots, VALUES};
 use crate::camera::Eye;
 use crate::geometry::lanes::{Real, Vector, simd_level};
 use crate::visibility::{SAMPLES, SurfaceMesh, Visibility};
@@ -37,8 +37,8 @@ pub trait Appearance: Sync {
     /// Reflectance at a point: asked for at every sample, so that patterns are antialiased as well.
     fn albedo(&self, hit: &Hit) -> Vec3;
 
-    /// The light that the reflectance is multiplied by: asked for once for every object that a pixel
-    /// shows, since it may cost a shadow ray.
+    /// The light that the reflectance is multiplied by: asked for once for what a pixel shows of a smooth surface, since it
+    /// may cost a shadow ray.
     fn light(&self, hit: &Hit) -> Vec3;
 
     /// Radiance from a direction (unit, scene space, away from the eye).
@@ -69,7 +69,7 @@ pub trait Appearance: Sync {
         out: &mut Colors,
     ) {
         for lane in 0..spots.len {
-            let light = self.light(&spots.lit_hit(mesh, object, lane));
+            let light = self.light(&spots.own_hit(mesh, object, lane));
             let mut sum = Vec3::ZERO;
             for sample in (0..SAMPLES).filter(|&s| spots.samples[s][lane] > 0.0) {
                 let albedo = self.albedo(&spots.sample_hit(mesh, object, lane, sample));
@@ -119,7 +119,7 @@ const BAND: usize = 8;
 
 /// Puts the picture together: `out` is row by row from the top left, linear RGB.
 ///
-/// Objects get one reflectance a sample and one light; the sky gets one value. A mirror's samples get the
+/// Objects get one reflectance a sample and one light a smooth surface; the sky gets one value. A mirror's samples get the
 /// pixel's own reflection, or, if another surface is at its centre, the mean of the neighbours that show
 /// the mirror at theirs, or, if there are none, the sky by the triangle's flat reflection.
 ///
@@ -130,10 +130,13 @@ pub fn compose(view: &DirectView, appearance: &impl Appearance, out: &mut [[f32;
     assert_eq!((view.reflection.len(), out.len()), (pixels, pixels), "planes of one size");
     let width = view.visibility.size.width as usize;
     let level = simd_level();
-    out.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(i, band)| {
-        let mut painter = Painter::new(view, appearance, i * BAND * width, band);
-        dispatch!(level, simd => painter.paint(simd));
-    });
+    out.par_chunks_mut((BAND * width).max(1)).enumerate().for_each_init(
+        Vec::new,
+        |spots, (i, band)| {
+            let mut painter = Painter::new(view, appearance, i * BAND * width, band, spots);
+            dispatch!(level, simd => painter.paint(simd));
+        },
+    );
 }
 
 /// As the display shows it: see [`DirectView::white`].

@@ -3,7 +3,7 @@
 use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
 
-use super::direct::{Appearance, Colors, CornerValues, Hit, LIT_VALUES, Spots, clamped};
+use super::direct::{Appearance, Colors, CornerValues, Hit, Spots, clamped};
 use crate::geometry::lanes::{Real, Vector, dot_const};
 use crate::scene::description::{Paint, PatternKind};
 use crate::scene::materials::Materials;
@@ -14,7 +14,7 @@ use crate::visibility::{SAMPLES, SurfaceMesh};
 /// Where the corner values start: normals (object space), places in the sun's map, and what the paint depends on.
 const NORMAL: usize = 0;
 const PLACE: usize = 3;
-const PAINT: usize = LIT_VALUES;
+const PAINT: usize = 6;
 
 /// A scene as [`super::direct::compose`] asks for it.
 pub(super) struct Look<'a> {
@@ -61,7 +61,7 @@ impl<'a> Look<'a> {
         spots: &Spots,
         at: usize,
     ) -> f32x16<S> {
-        let weights: [f32x16<S>; 3] = spots.lit_weights(simd, at);
+        let weights: [f32x16<S>; 3] = spots.own_weights(simd, at);
         let normal = spots.values(simd, at, weights, NORMAL);
         let square = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
         let tiny = square.splat(f32::MIN_POSITIVE);
@@ -79,7 +79,7 @@ impl<'a> Look<'a> {
             if *facing > 0.0 {
                 let place = places.map(|lanes| lanes[i]);
                 let known = self.scene.sun_map.lights(place, *facing);
-                if !known.unwrap_or_else(|| self.sees_sun(&spots.lit_hit(mesh, object, at + i))) {
+                if !known.unwrap_or_else(|| self.sees_sun(&spots.own_hit(mesh, object, at + i))) {
                     *facing = 0.0;
                 }
             }

@@ -2,14 +2,12 @@
 //! sees for each. Where a mirror's triangles are small, a cell spans many; where they are large or strongly curved,
 //! a triangle has many cells. Their number follows the picture, not the mesh.
 
-mod field;
 mod fit;
 
 use fearless_simd::{Simd, dispatch};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use self::field::{Linear, RayField, centre};
 use self::fit::{Judge, Mask, Sums};
 use super::super::FrameInput;
 use super::cameras::{CameraSettings, Top, View, of_view, sees_objects, starts};
@@ -17,12 +15,9 @@ use super::guard::Outline;
 use crate::camera::Eye;
 use crate::camera::three_ray::Rays;
 use crate::plan::{CELL_SLACK_PX, CameraInstance, Pixels};
+use crate::visibility::mirror_rays::{Linear, RayField, TILE, TILE_PX, centre};
 use crate::visibility::{MirrorTriangleIndex, OwnPixels, Patch, PixelRect};
 
-/// Columns and rows of a tile: the largest cell. A row is a word of bits.
-const TILE_PX: u32 = 32;
-/// The same for indices.
-const TILE: usize = TILE_PX as usize;
 /// How far points of the mirror may lie from a cell's plane, in pixels. Measured: from 2 to a half errors fall by 2 to 6 % at
 /// next to no cost, as boxes are refused sooner; below that cells become more, and errors hardly less.
 const SURFACE_TOLERANCE_PX: f32 = 0.5;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use fearless_simd::{Simd, f32x16};
 use glam::{DVec2, Vec3};
 
-use super::spots::{Colors, LANES, Met, Setup, SkySpots, Spot, Spots, color};
+use super::spots::{Colors, LANES, Met, SkySpots, Spot, Spots, color};
 use super::{Appearance, DirectView, clamped};
 use crate::geometry::lanes::{Real, Vector, dot};
 use crate::visibility::{NONE_ID, RayWeights, SAMPLE_EIGHTHS, SAMPLES, SurfaceMesh};
@@ -84,7 +84,7 @@ pub(super) struct Painter<'a, A> {
     surface: (Range<u32>, Option<usize>),
     sky: SkySpots,
     /// What is seen of each object.
-    spots: Vec<Vec<Spot>>,
+    spots: &'a mut Vec<Vec<Spot>>,
 }
 
 impl<'a, A: Appearance> Painter<'a, A> {
@@ -94,9 +94,10 @@ impl<'a, A: Appearance> Painter<'a, A> {
         appearance: &'a A,
         first: usize,
         band: &'a mut [[f32; 3]],
+        spots: &'a mut Vec<Vec<Spot>>,
     ) -> Self {
         band.fill([0.0; 3]);
-        let spots = vec![Vec::new(); view.objects.len()];
+        spots.resize_with(view.objects.len(), Vec::new);
         let sky = SkySpots::default();
         Self { view, appearance, first, band, surface: (0..0, None), sky, spots }
     }
@@ -141,7 +142,7 @@ impl<'a, A: Appearance> Painter<'a, A> {
             }
         } else {
             let surface = self.surface_of(id);
-            self.push(surface, id, pixels, ALL, (id, ALL));
+            self.push(surface, id, pixels, ALL);
         }
     }
 
@@ -150,6 +151,14 @@ impl<'a, A: Appearance> Painter<'a, A> {
     fn pixel<S: Simd>(&mut self, simd: S, i: usize, ids: [u32; SAMPLES]) {
         let visibility = self.view.visibility;
         let at = self.first + i;
+        let surface = self.surface_of(ids[0]);
+        if let Some(object) = surface
+            && object >= visibility.mirrors()
+            && ids.iter().all(|id| self.surface.0.contains(id))
+        {
+            self.push_object(object, &ids.map(|id| Seen { surface, id }), i, ALL);
+            return;
+        }
         let seen = ids.map(|id| Seen { surface: self.surface_of(id), id });
         let mut done = 0;
         for (sample, Seen { surface, id }) in seen.into_iter().enumerate() {
@@ -170,33 +179,42 @@ impl<'a, A: Appearance> Painter<'a, A> {
                     };
                     self.add(i, value * group.count());
                 }
-                Some(object) => {
-                    let lit = (seen[group.middle_sample()].id, group);
-                    if self.appearance.varies(object - visibility.mirrors()) {
-                        self.push_each(surface, &seen, i, lit);
-                    } else {
-                        self.push(surface, lit.0, i..i + 1, group, lit);
-                    }
-                }
+                Some(object) => self.push_object(object, &seen, i, group),
             }
         }
     }
 
-    /// Remembers what a pixel shows of an object, triangle by triangle.
+    /// Whether all triangles of a surface that a pixel shows have a corner in common with one of them: then what that one
+    /// shows at its edges is what the others show. Where a mesh has an edge, its sides have corners of their own.
     #[inline(always)]
-    fn push_each(
-        &mut self,
-        surface: Option<usize>,
-        seen: &[Seen; SAMPLES],
-        i: usize,
-        lit: (u32, Group),
-    ) {
-        let mut rest = lit.1.0;
+    fn goes_on(&self, surface: usize, middle: u32, seen: &[Seen; SAMPLES]) -> bool {
+        let visibility = self.view.visibility;
+        let triangles = self.view.objects[surface - visibility.mirrors()].triangles;
+        let first = visibility.ids(surface).start;
+        let own = triangles[(middle - first) as usize];
+        seen.iter().all(|other| {
+            other.surface != Some(surface)
+                || other.id == middle
+                || triangles[(other.id - first) as usize].iter().any(|corner| own.contains(corner))
+        })
+    }
+
+    /// Remembers what a group of a pixel's samples shows of an object: as one, or triangle by triangle.
+    #[inline(always)]
+    fn push_object(&mut self, object: usize, seen: &[Seen; SAMPLES], i: usize, group: Group) {
+        let middle = seen[group.middle_sample()].id;
+        if !self.appearance.varies(object - self.view.visibility.mirrors())
+            || self.goes_on(object, middle, seen)
+        {
+            self.push(Some(object), middle, i..i + 1, group);
+            return;
+        }
+        let mut rest = group.0;
         while rest != 0 {
             let id = seen[rest.trailing_zeros() as usize].id;
             let group = Group::of(seen, |other| other.id == id);
             rest &= !group.0;
-            self.push(surface, id, i..i + 1, group, lit);
+            self.push(Some(object), id, i..i + 1, group);
         }
     }
 
@@ -225,7 +243,6 @@ impl<'a, A: Appearance> Painter<'a, A> {
         id: u32,
         pixels: Range<usize>,
         samples: Group,
-        lit: (u32, Group),
     ) {
         let Some(surface) = surface else { return };
         let visibility = self.view.visibility;
@@ -235,7 +252,6 @@ impl<'a, A: Appearance> Painter<'a, A> {
             pixel: pixels.start as u32,
             pixels: pixels.len() as u32,
             samples,
-            lit: (lit.0 - first, lit.1),
         });
     }
 
@@ -290,7 +306,7 @@ impl<'a, A: Appearance> Painter<'a, A> {
     /// Adds all that is seen of an object.
     #[inline(always)]
     fn paint_object<S: Simd>(&mut self, simd: S, object: usize) {
-        let list = std::mem::take(&mut self.spots[object]);
+        let mut list = std::mem::take(&mut self.spots[object]);
         if list.is_empty() {
             return;
         }
@@ -304,26 +320,22 @@ impl<'a, A: Appearance> Painter<'a, A> {
         };
         // Neighbours mostly show the same.
         let mut shown = meet(list[0].triangle);
-        let mut lit = meet(list[0].lit.0);
         for spot in &list {
             if shown.triangle != spot.triangle {
                 shown = meet(spot.triangle);
             }
-            let own = spot.lit.0 == spot.triangle;
-            if !own && lit.triangle != spot.lit.0 {
-                lit = meet(spot.lit.0);
-            }
-            let middle = self.middle_px(spot.pixel as usize, ALL);
-            let setup = Setup::new(&shown, if own { &shown } else { &lit }, middle);
+            let shares = shown.rays.shares_about(self.middle_px(spot.pixel as usize, ALL));
             let mut ahead = 0;
             while ahead < spot.pixels {
-                ahead += spots.push(spot, &setup, ahead);
+                ahead += spots.push(spot, &shares, &shown.values, ahead);
                 if spots.len == LANES {
                     self.paint_spots(simd, mesh, object, &mut spots);
                 }
             }
         }
         self.paint_spots(simd, mesh, object, &mut spots);
+        list.clear();
+        self.spots[object] = list;
     }
 
     #[inline(always)]

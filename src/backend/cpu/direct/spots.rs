@@ -1,7 +1,7 @@
 //! Pieces of triangles as pixels show them, a lane for each.
 
 use fearless_simd::Simd;
-use glam::{DVec2, Vec3};
+use glam::Vec3;
 
 use super::Hit;
 use super::painter::{Group, MIDDLES};
@@ -13,9 +13,6 @@ pub const LANES: usize = 32;
 
 /// Numbers that an [`super::Appearance`] has interpolated over triangles.
 pub const VALUES: usize = 9;
-
-/// So many of them the light depends on: they come first.
-pub const LIT_VALUES: usize = 6;
 
 /// The values at the corners of a triangle.
 pub type CornerValues = [[f32; VALUES]; 3];
@@ -30,17 +27,13 @@ pub struct Spots {
     pub len: usize,
     /// Index of the triangle within the object.
     pub triangle: [u32; LANES],
-    /// The same of the triangle whose light it has.
-    pub lit: [u32; LANES],
     /// 1 for each sample that is meant, else 0.
     pub samples: [[f32; LANES]; SAMPLES],
     /// The sum of those.
     pub count: [f32; LANES],
-    /// Where the light is asked for: from the pixel's middle, px.
+    /// The mean of the samples: from the pixel's middle, px.
     middle: [[f32; LANES]; 2],
     shares: Shares,
-    /// Those of the triangles of `lit`.
-    lit_shares: Shares,
     /// Pixels from that one.
     ahead: [f32; LANES],
     values: [[[f32; LANES]; VALUES]; 3],
@@ -56,12 +49,10 @@ impl Default for Spots {
         Self {
             len: 0,
             triangle: [0; LANES],
-            lit: [0; LANES],
             samples: [[0.0; LANES]; SAMPLES],
             count: [0.0; LANES],
             middle: [[0.0; LANES]; 2],
             shares: [[[0.0; LANES]; 3]; 3],
-            lit_shares: [[[0.0; LANES]; 3]; 3],
             ahead: [0.0; LANES],
             values: [[[0.0; LANES]; VALUES]; 3],
             pixel: [0; LANES],
@@ -77,31 +68,6 @@ pub(super) struct Spot {
     pub(super) pixel: u32,
     pub(super) pixels: u32,
     pub(super) samples: Group,
-    /// The triangle whose light it has, and the samples in the middle of which it is asked for.
-    pub(super) lit: (u32, Group),
-}
-
-/// What is the same for all pixels of a [`Spot`].
-pub(super) struct Setup {
-    shares: [[f32; 3]; 3],
-    lit_shares: [[f32; 3]; 3],
-    values: CornerValues,
-}
-
-impl Setup {
-    /// `shown`, `lit`: the triangles; `middle`: of the first pixel, px.
-    pub(super) fn new(shown: &Met, lit: &Met, middle: DVec2) -> Self {
-        let shares = shown.rays.shares_about(middle);
-        let mut values = shown.values;
-        let mut lit_shares = shares;
-        if lit.triangle != shown.triangle {
-            lit_shares = lit.rays.shares_about(middle);
-            for (own, lit) in values.iter_mut().zip(&lit.values) {
-                own[..LIT_VALUES].copy_from_slice(&lit[..LIT_VALUES]);
-            }
-        }
-        Self { shares, lit_shares, values }
-    }
 }
 
 /// A triangle of which something was seen.
@@ -113,10 +79,16 @@ pub(super) struct Met {
 
 impl Spots {
     /// Adds as many of a spot's pixels as there is room for, from the pixel that is `ahead` of its first one, and returns
-    /// their number.
+    /// their number. `shares`: of the triangle, about the middle of the first pixel.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "parts of pixels")]
-    pub(super) fn push(&mut self, spot: &Spot, setup: &Setup, ahead: u32) -> u32 {
+    pub(super) fn push(
+        &mut self,
+        spot: &Spot,
+        shares: &[[f32; 3]; 3],
+        values: &CornerValues,
+        ahead: u32,
+    ) -> u32 {
         let from = self.len;
         let room = u32::try_from(LANES - from).unwrap_or(0);
         let added = room.min(spot.pixels - ahead);
@@ -131,60 +103,40 @@ impl Spots {
             return added;
         }
         put(&mut self.triangle, from, to, spot.triangle);
-        put(&mut self.lit, from, to, spot.lit.0);
         for (sample, lanes) in self.samples.iter_mut().enumerate() {
             put(lanes, from, to, (spot.samples.0 >> sample & 1) as f32);
         }
         put(&mut self.count, from, to, spot.samples.count());
         for k in 0..2 {
-            put(&mut self.middle[k], from, to, MIDDLES[spot.lit.1.0].0[k] as f32 - 0.5);
+            put(&mut self.middle[k], from, to, MIDDLES[spot.samples.0].0[k] as f32 - 0.5);
         }
         for k in 0..3 {
             for i in 0..3 {
-                put(&mut self.shares[k][i], from, to, setup.shares[k][i]);
-                put(&mut self.lit_shares[k][i], from, to, setup.lit_shares[k][i]);
+                put(&mut self.shares[k][i], from, to, shares[k][i]);
             }
-            for (lanes, value) in self.values[k].iter_mut().zip(setup.values[k]) {
+            for (lanes, value) in self.values[k].iter_mut().zip(values[k]) {
                 put(lanes, from, to, value);
             }
         }
         added
     }
 
-    /// The weights of the corners of `lit` where the light is asked for, in the lanes from `at` on.
-    #[inline(always)]
-    pub fn lit_weights<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [V; 3] {
-        let x = V::load(simd, &self.middle[0][at..]);
-        let y = V::load(simd, &self.middle[1][at..]);
-        self.weights(simd, at, &self.lit_shares, [x, y])
-    }
-
     /// The weights of the corners in the middle of the samples, in the lanes from `at` on.
     #[inline(always)]
     pub fn own_weights<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [V; 3] {
-        let place = self.own_place(simd, at);
-        self.weights(simd, at, &self.shares, place)
+        self.weights(simd, at, self.own_place(simd, at), 0.0)
     }
 
     /// The same, and those a pixel to the right and a pixel below: how far the pixel reaches.
     #[inline(always)]
     pub fn pixel_weights<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [[V; 3]; 3] {
         let [x, y] = self.own_place(simd, at);
-        [[x, y], [x + 1.0, y], [x, y + 1.0]]
-            .map(|place| self.weights(simd, at, &self.shares, place))
+        [[x, y], [x + 1.0, y], [x, y + 1.0]].map(|place| self.weights(simd, at, place, 0.0))
     }
 
-    /// The middle of the samples, from the pixel's.
     #[inline(always)]
     fn own_place<S: Simd, V: Vector<S>>(&self, simd: S, at: usize) -> [V; 2] {
-        let (mut x, mut y) = (V::broadcast(simd, 0.0), V::broadcast(simd, 0.0));
-        for (sample, lanes) in self.samples.iter().enumerate() {
-            let covered = V::load(simd, &lanes[at..]);
-            let [dx, dy] = from_middle(sample);
-            (x, y) = (x + covered * dx, y + covered * dy);
-        }
-        let count = V::load(simd, &self.count[at..]).max(V::broadcast(simd, 1.0));
-        [x / count, y / count]
+        [V::load(simd, &self.middle[0][at..]), V::load(simd, &self.middle[1][at..])]
     }
 
     /// The weights of the corners at one of the samples of a pixel, in the lanes from `at` on.
@@ -197,27 +149,28 @@ impl Spots {
     ) -> [V; 3] {
         let [x, y] = from_middle(sample);
         let place = [V::broadcast(simd, x), V::broadcast(simd, y)];
-        self.weights(simd, at, &self.shares, place)
+        self.weights(simd, at, place, -BEYOND)
     }
 
-    /// At a place that is given from the pixels' middles (px).
+    /// At a place that is given from the pixels' middles (px); none less than `least`.
     #[inline(always)]
     fn weights<S: Simd, V: Vector<S>>(
         &self,
         simd: S,
         at: usize,
-        shares: &Shares,
         [x, y]: [V; 2],
+        least: f32,
     ) -> [V; 3] {
         let place = [x + V::load(simd, &self.ahead[at..]), y];
+        let least = V::broadcast(simd, least);
         normalized([
-            share(simd, at, shares, 0, place),
-            share(simd, at, shares, 1, place),
-            share(simd, at, shares, 2, place),
+            share(simd, at, &self.shares, 0, place).max(least),
+            share(simd, at, &self.shares, 1, place).max(least),
+            share(simd, at, &self.shares, 2, place).max(least),
         ])
     }
 
-    /// Three of the values at points of the lanes from `at` on: of `lit` below [`LIT_VALUES`].
+    /// Three of the values at points of the lanes from `at` on.
     #[inline(always)]
     pub fn values<S: Simd, V: Vector<S>>(
         &self,
@@ -241,32 +194,29 @@ impl Spots {
             + V::load(simd, &c[i][at..]) * weights[2]
     }
 
-    /// Where the light of one lane is asked for.
-    pub fn lit_hit(&self, mesh: &SurfaceMesh, object: usize, lane: usize) -> Hit {
-        let place = [self.middle[0][lane], self.middle[1][lane]];
-        self.hit(mesh, object, self.lit[lane], &self.lit_shares, lane, place)
+    /// The point in the middle of the samples of one lane.
+    pub fn own_hit(&self, mesh: &SurfaceMesh, object: usize, lane: usize) -> Hit {
+        self.hit(mesh, object, lane, [self.middle[0][lane], self.middle[1][lane]], 0.0)
     }
 
     /// The point at a sample of one lane.
     pub fn sample_hit(&self, mesh: &SurfaceMesh, object: usize, lane: usize, sample: usize) -> Hit {
-        let place = from_middle(sample);
-        self.hit(mesh, object, self.triangle[lane], &self.shares, lane, place)
+        self.hit(mesh, object, lane, from_middle(sample), -BEYOND)
     }
 
     fn hit(
         &self,
         mesh: &SurfaceMesh,
         object: usize,
-        triangle: u32,
-        shares: &Shares,
         lane: usize,
         [x, y]: [f32; 2],
+        least: f32,
     ) -> Hit {
         let x = x + self.ahead[lane];
-        let [start, by_x, by_y] = shares;
-        let share = |k: usize| (start[k][lane] + by_x[k][lane] * x + by_y[k][lane] * y).max(0.0);
+        let [start, by_x, by_y] = &self.shares;
+        let share = |k: usize| (start[k][lane] + by_x[k][lane] * x + by_y[k][lane] * y).max(least);
         let weights = normalized([share(0), share(1), share(2)]);
-        let triangle = triangle as usize;
+        let triangle = self.triangle[lane] as usize;
         let [a, b, c] = mesh.corners(triangle);
         Hit { object, triangle, weights, point: a * weights[0] + b * weights[1] + c * weights[2] }
     }
@@ -282,8 +232,7 @@ fn put<T: Copy>(lanes: &mut [T; LANES], from: usize, to: usize, value: T) {
     }
 }
 
-/// One of the functions. Where the view ray passes the triangle, which it does by less than a pixel, negative ones are
-/// taken for zero.
+/// One of the functions.
 #[inline(always)]
 fn share<S: Simd, V: Vector<S>>(
     simd: S,
@@ -295,7 +244,7 @@ fn share<S: Simd, V: Vector<S>>(
     let start = V::load(simd, &shares[0][k][at..]);
     let by_x = V::load(simd, &shares[1][k][at..]);
     let by_y = V::load(simd, &shares[2][k][at..]);
-    (start + by_x * x + by_y * y).max(V::broadcast(simd, 0.0))
+    start + by_x * x + by_y * y
 }
 
 /// The same with the sum 1, whatever they are.
@@ -316,6 +265,10 @@ fn normalized<R: Real<Scalar = f32>>(shares: [R; 3]) -> [R; 3] {
 fn from_middle(sample: usize) -> [f32; 2] {
     SAMPLE_EIGHTHS[sample].map(|eighths| f32::from(eighths) / 8.0 - 0.5)
 }
+
+/// A smooth surface goes on as its triangle for so many sizes of it, for samples that show a neighbour. Else, where the view
+/// ray passes the triangle, which it does by less than a pixel, negative weights are taken for zero.
+const BEYOND: f32 = 1.0;
 
 /// Radiances, transposed.
 pub type Colors = [[f32; LANES]; 3];

@@ -127,6 +127,7 @@ pub(super) fn rasterise(drawing: &Drawing<'_>) -> Vec<Hit> {
         .map(|(i, object)| SurfaceMesh {
             positions: moved.get(i).unwrap_or(&object.places),
             triangles: &object.triangles,
+            encloses: None,
         })
         .collect();
     let mut seen = Visibility::default();
@@ -194,7 +195,7 @@ fn back_depth(drawing: &Drawing<'_>) -> Vec<f32> {
     let triangles = drawing.back_faces();
     let positions = &drawing.scene.mirrors[drawing.part.mirror].positions;
     let mut seen = Visibility::default();
-    let surface = SurfaceMesh { positions, triangles: &triangles };
+    let surface = SurfaceMesh { positions, triangles: &triangles, encloses: None };
     seen.update(drawing.eye, &[surface], &[], &mut Scratch::default());
     seen.mirror_depth
 }

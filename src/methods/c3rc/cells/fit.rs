@@ -5,8 +5,7 @@
 use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
 
-use super::TILE;
-use super::field::{AREA, Linear, centre};
+use crate::visibility::mirror_rays::{AREA, Linear, TILE, centre};
 use crate::geometry::lanes::{Real, Vector};
 
 /// Sums over pixels from which the best linear function follows. They can be added.

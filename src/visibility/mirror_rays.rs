@@ -5,20 +5,23 @@
 use fearless_simd::{Simd, SimdBase, SimdMask, u32x16};
 use glam::{DVec3, Vec3};
 
-use super::{TILE, TILE_PX};
+use super::{NONE_ID, Visibility};
 use crate::camera::Eye;
 use crate::scene::prepared::PreparedScene;
-use crate::visibility::{NONE_ID, Visibility};
 
+/// Columns and rows of a tile. A row is a word of bits.
+pub(crate) const TILE_PX: u32 = 32;
+/// The same for indices.
+pub(crate) const TILE: usize = TILE_PX as usize;
 /// Elements of a tile, by row.
-pub(super) const AREA: usize = TILE * TILE;
+pub(crate) const AREA: usize = TILE * TILE;
 
 /// Quantities that are linear over the picture, at (x, y) pixels from the middle of the tile.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Linear<const N: usize> {
-    pub(super) at: [f32; N],
-    pub(super) right: [f32; N],
-    pub(super) down: [f32; N],
+pub(crate) struct Linear<const N: usize> {
+    pub(crate) at: [f32; N],
+    pub(crate) right: [f32; N],
+    pub(crate) down: [f32; N],
 }
 
 impl<const N: usize> Default for Linear<N> {
@@ -29,14 +32,14 @@ impl<const N: usize> Default for Linear<N> {
 
 impl<const N: usize> Linear<N> {
     #[inline(always)]
-    pub(super) fn get(&self, k: usize, x: f32, y: f32) -> f32 {
+    pub(crate) fn get(&self, k: usize, x: f32, y: f32) -> f32 {
         self.at[k] + x * self.right[k] + y * self.down[k]
     }
 }
 
 /// The position of the centre of column or row `i`, relative to the middle of its tile.
 #[inline(always)]
-pub(super) fn centre(i: usize) -> f32 {
+pub(crate) fn centre(i: usize) -> f32 {
     i as f32 + 0.5 - TILE as f32 * 0.5
 }
 
@@ -53,9 +56,9 @@ const FACETS: usize = 64;
 
 /// One quantity a pixel. A ray that leaves the mirror at depth z runs along z · (`field[0]`, `field[1]`, `field[2]`);
 /// `field[3]` is 1/z.
-pub(super) struct RayField {
-    pub(super) field: [[f32; AREA]; 4],
-    pub(super) ids: [u32; AREA],
+pub(crate) struct RayField {
+    pub(crate) field: [[f32; AREA]; 4],
+    pub(crate) ids: [u32; AREA],
     view: Linear<3>,
     /// Of the tile, in pixels.
     middle: [f32; 2],
@@ -63,7 +66,7 @@ pub(super) struct RayField {
 }
 
 impl RayField {
-    pub(super) fn new() -> Box<Self> {
+    pub(crate) fn new() -> Box<Self> {
         let facet = Facet { id: NONE_ID, normal_and_inverse: Linear::default() };
         Box::new(Self {
             field: [[0.0; AREA]; 4],
@@ -76,7 +79,7 @@ impl RayField {
 
     /// Goes to the tile whose first pixel is (`left`, `top`); returns by row which pixels show a mirror.
     #[inline(always)]
-    pub(super) fn enter<S: Simd>(
+    pub(crate) fn enter<S: Simd>(
         &mut self,
         simd: S,
         eye: &Eye,
@@ -120,7 +123,7 @@ impl RayField {
 
     /// Fills in the rays of the pixels of `mask`, of which all must show a mirror.
     #[inline(always)]
-    pub(super) fn fill(&mut self, eye: &Eye, scene: &PreparedScene, mask: &[u32; TILE]) {
+    pub(crate) fn fill(&mut self, eye: &Eye, scene: &PreparedScene, mask: &[u32; TILE]) {
         for y in 0..TILE {
             let mut left = mask[y];
             while left != 0 {
@@ -142,13 +145,13 @@ impl RayField {
 
     /// The field at a pixel.
     #[inline(always)]
-    pub(super) fn at(&self, [x, y]: [usize; 2]) -> [f32; 4] {
+    pub(crate) fn at(&self, [x, y]: [usize; 2]) -> [f32; 4] {
         let at = y * TILE + x;
         [self.field[0][at], self.field[1][at], self.field[2][at], self.field[3][at]]
     }
 
     /// The field about a pixel as its own triangle continues it.
-    pub(super) fn tangent(
+    pub(crate) fn tangent(
         &mut self,
         eye: &Eye,
         scene: &PreparedScene,
