@@ -354,8 +354,7 @@ fn weights_give_the_point_on_the_ray() {
 #[test]
 fn backs_of_what_encloses_something_are_left_out_from_outside_only() {
     let (positions, triangles) = sphere(Vec3::ZERO, 24, 12);
-    let surface =
-        |encloses| SurfaceMesh { positions: &positions, triangles: &triangles, encloses };
+    let surface = |encloses| SurfaceMesh { positions: &positions, triangles: &triangles, encloses };
     let outside = eye([0.0, 0.4, 3.0], [0.0, 0.0, 0.0], 60, 40);
     let inside = eye([0.0, 0.1, 0.2], [0.3, 0.0, 1.0], 60, 40);
     let held = Some(Aabb::of(positions.iter().copied()));
@@ -372,7 +371,12 @@ fn backs_of_what_encloses_something_are_left_out_from_outside_only() {
     let backs: Vec<[u32; 3]> = triangles.iter().filter(back).copied().collect();
     let shown = |encloses| {
         let surface = SurfaceMesh { positions: &positions, triangles: &backs, encloses };
-        seen(&outside, &[], &[surface]).samples.iter().flatten().filter(|id| **id != NONE_ID).count()
+        seen(&outside, &[], &[surface])
+            .samples
+            .iter()
+            .flatten()
+            .filter(|id| **id != NONE_ID)
+            .count()
     };
     assert!(shown(None) > 100);
     assert_eq!(shown(held), 0);

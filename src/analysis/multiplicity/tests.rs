@@ -214,7 +214,11 @@ fn pictures_colour_the_mirror_only() {
     let size = ImageSize { width: 160, height: 120 };
     let eye = scene.eye_for(size).unwrap();
     let mirror = &scene.mirrors[0];
-    let mesh = SurfaceMesh { positions: &mirror.positions, triangles: mirror.mesh.triangles(), encloses: None };
+    let mesh = SurfaceMesh {
+        positions: &mirror.positions,
+        triangles: mirror.mesh.triangles(),
+        encloses: None,
+    };
     let mut visibility = Visibility::default();
     visibility.update(&eye, &[mesh], &[], &mut Scratch::default());
     let list = MirrorCameras::new(&scene, eye.position, RayScale::EyeDistance);

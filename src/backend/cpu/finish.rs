@@ -154,10 +154,8 @@ impl Band<'_> {
                     [0, 1, 2].map(|k| Vector::load(simd, &field.field[k][y * TILE + half..]));
                 let squared = dot(ray, ray).max(f32x16::broadcast(simd, f32::MIN_POSITIVE));
                 let inverse = squared.splat(1.0) / Real::sqrt(squared);
-                let sky = self
-                    .scene
-                    .environment
-                    .radiance_in(ray.map(|d| d * inverse), &self.scene.light);
+                let sky =
+                    self.scene.environment.radiance_in(ray.map(|d| d * inverse), &self.scene.light);
                 let mut lanes = [[0.0; 16]; 3];
                 lanes.iter_mut().zip(sky).for_each(|(lanes, sky)| sky.store(lanes));
                 for i in (0..16).filter(|i| open[y] >> (half + i) & 1 != 0) {

@@ -1,4 +1,4 @@
-//! Whatever hands do, nothing breaks. `CATOPTRIC_LONG_TESTS=1` does it for two minutes and looks at the memory.
+//! Whatever hands do, nothing breaks. `CATOPTRIC_LONG_TESTS=1` does it for three minutes and looks at the memory.
 
 use eframe::egui::{Event, Key, Modifiers, PointerButton, vec2};
 
@@ -50,14 +50,15 @@ fn memory() -> Option<u64> {
 #[test]
 fn random_input_breaks_nothing() {
     let long = std::env::var_os("CATOPTRIC_LONG_TESTS").is_some();
-    let minute = Duration::from_secs(if long { 60 } else { 3 });
+    let minute = Duration::from_secs(if long { 60 } else { 2 });
     let (_folder, path) = small();
     let mut hands = opened(&path, [700.0, 500.0], Settings::default());
     hands.step();
     until_drawn(&mut hands);
-    let mut dice = Dice(7);
     let (mut after, mut steps) = (Vec::new(), 0);
-    for _ in 0..2 {
+    for _ in 0..3 {
+        // The same again: what is done for the first time takes memory that allocators and drivers keep.
+        let mut dice = Dice(7);
         let start = Instant::now();
         while start.elapsed() < minute {
             act(&mut hands, &mut dice);
@@ -68,12 +69,17 @@ fn random_input_breaks_nothing() {
                 hands.render().expect("it paints");
             }
         }
-        // Both minutes end with the same window.
+        // All minutes end with the same window, and with the same scene however finely it was sampled.
         hands.set_size(vec2(700.0, 500.0));
         let viewer = viewer_mut(&mut hands);
         viewer.settings = Settings::default();
         viewer.selected = None;
-        hands.step();
+        viewer.prepare = opening("").prepare;
+        let before = viewer.prepared.as_ref().map(|p| p.generation);
+        viewer.open(std::slice::from_ref(&path));
+        until(&mut hands, "the scene", |viewer| {
+            viewer.prepared.as_ref().map(|p| p.generation) != before
+        });
         until_drawn(&mut hands);
         for _ in 0..4 {
             hands.step();
@@ -87,7 +93,7 @@ fn random_input_breaks_nothing() {
         assert!(eye.is_finite());
     }
     assert!(viewer(&hands).shots > 3);
-    if let (true, &[Some(first), Some(second)]) = (long, after.as_slice()) {
+    if let (true, &[_, Some(first), Some(second)]) = (long, after.as_slice()) {
         assert!(second <= first + (16 << 20), "{first} bytes grew to {second}");
     }
 }

@@ -42,8 +42,10 @@ fn composed(
     let (mirror_points, object_points) = (mesh(&mirror), mesh(&object));
     let of =
         |points: &[Vec3]| -> &[[u32; 3]] { if points.is_empty() { &[] } else { &[[0, 1, 2]] } };
-    let mirrors = [SurfaceMesh { positions: &mirror_points, triangles: of(&mirror_points), encloses: None }];
-    let objects = [SurfaceMesh { positions: &object_points, triangles: of(&object_points), encloses: None }];
+    let mirrors =
+        [SurfaceMesh { positions: &mirror_points, triangles: of(&mirror_points), encloses: None }];
+    let objects =
+        [SurfaceMesh { positions: &object_points, triangles: of(&object_points), encloses: None }];
     let mut visibility = Visibility::default();
     visibility.update(&eye, &mirrors, &objects, &mut Scratch::default());
     let reflected: Vec<Vec3> = visibility

@@ -5,8 +5,8 @@
 use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
 
-use crate::visibility::mirror_rays::{AREA, Linear, TILE, centre};
 use crate::geometry::lanes::{Real, Vector};
+use crate::visibility::mirror_rays::{AREA, Linear, TILE, centre};
 
 /// Sums over pixels from which the best linear function follows. They can be added.
 #[derive(Clone, Copy, Debug, Default)]
