@@ -35,7 +35,8 @@ pub fn finish(
         .zip(reflection.coverage.par_chunks(rows))
         .enumerate()
         .for_each_init(RayField::new, |field, (row, (radiance, coverage))| {
-            let mut band = Band { scene, eye, visibility, row, radiance, coverage, behind };
+            let top = u32::try_from(row).unwrap_or(u32::MAX) * TILE_PX;
+            let mut band = Band { scene, eye, visibility, top, radiance, coverage, behind };
             dispatch!(level, simd => band.finish(simd, field));
         });
     if let Some(planes) = &mut reflection.planes {
@@ -83,6 +84,7 @@ pub fn object_surfaces<'a>(scene: &'a PreparedScene) -> Vec<SurfaceMesh<'a>> {
 }
 
 /// A box that holds a cloud's surface: the surfels stay a little within it.
+#[expect(clippy::cast_possible_truncation, reason = "lengths are f32 everywhere")]
 fn held(cloud: &Cloud) -> Aabb {
     let margin = Vec3::splat(cloud.extent * cloud.to_scene.scale as f32);
     Aabb { min: cloud.bounds.min - margin, max: cloud.bounds.max + margin }
@@ -93,7 +95,8 @@ struct Band<'a> {
     scene: &'a PreparedScene,
     eye: &'a Eye,
     visibility: &'a Visibility,
-    row: usize,
+    /// Its first row of pixels.
+    top: u32,
     radiance: &'a mut [Vec3],
     coverage: &'a [f32],
     /// Whether the environment shows behind what landed.
@@ -107,8 +110,7 @@ impl Band<'_> {
         // The mirror of the last pixel: its ids and its tint.
         let mut mirror = (0..0, Vec3::ONE);
         for left in (0..width).step_by(TILE) {
-            let top = self.row as u32 * TILE_PX;
-            let shown = field.enter(simd, self.eye, self.visibility, [left, top]);
+            let shown = field.enter(simd, self.eye, self.visibility, [left, self.top]);
             if shown == [0; TILE] {
                 continue;
             }
@@ -148,8 +150,8 @@ impl Band<'_> {
             }
         }
         field.fill(self.eye, self.scene, &open);
-        for y in 0..TILE {
-            for half in (0..TILE).step_by(16).filter(|half| open[y] >> half & 0xffff != 0) {
+        for (y, open) in open.into_iter().enumerate() {
+            for half in (0..TILE).step_by(16).filter(|half| open >> half & 0xffff != 0) {
                 let ray: [f32x16<S>; 3] =
                     [0, 1, 2].map(|k| Vector::load(simd, &field.field[k][y * TILE + half..]));
                 let squared = dot(ray, ray).max(f32x16::broadcast(simd, f32::MIN_POSITIVE));
@@ -158,7 +160,7 @@ impl Band<'_> {
                     self.scene.environment.radiance_in(ray.map(|d| d * inverse), &self.scene.light);
                 let mut lanes = [[0.0; 16]; 3];
                 lanes.iter_mut().zip(sky).for_each(|(lanes, sky)| sky.store(lanes));
-                for i in (0..16).filter(|i| open[y] >> (half + i) & 1 != 0) {
+                for i in (0..16).filter(|i| open >> (half + i) & 1 != 0) {
                     let at = at(half + i, y);
                     let covered = self.coverage[at];
                     let sky = Vec3::from(lanes.map(|lane| lane[i])) * (1.0 - covered);

@@ -111,8 +111,8 @@ impl Spots {
             put(&mut self.middle[k], from, to, MIDDLES[spot.samples.0].0[k] as f32 - 0.5);
         }
         for k in 0..3 {
-            for i in 0..3 {
-                put(&mut self.shares[k][i], from, to, shares[k][i]);
+            for (lanes, share) in self.shares[k].iter_mut().zip(shares[k]) {
+                put(lanes, from, to, share);
             }
             for (lanes, value) in self.values[k].iter_mut().zip(values[k]) {
                 put(lanes, from, to, value);
