@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use eframe::egui::{self, TextureHandle, TextureOptions};
 use glam::DVec3;
 
+use super::dialog::Kind;
 use super::gizmo::Handles;
 use super::settings::{MirrorColors, Settings, Shown};
 use super::worker::{
@@ -35,6 +36,8 @@ const BUDGET_MS: f64 = 33.0;
 const LEAST_SCALE: f64 = 0.5;
 /// Reports that are kept for the plot.
 const HISTORY: usize = 120;
+const NO_DIALOG: &str = "this system shows no file dialog (Linux: install zenity or xdg-desktop-portal); \
+                         drop files on the window, or name them: catoptric view FILE";
 /// How long a message stays.
 const MESSAGE: Duration = Duration::from_secs(6);
 
@@ -44,6 +47,8 @@ pub(super) enum Chosen {
     Picture(PathBuf),
     Aov(PathBuf),
     Scene(PathBuf),
+    /// The system had none to show.
+    NoDialog(Kind),
 }
 
 /// What was drawn last, as the window has it.
@@ -199,7 +204,19 @@ impl Viewer {
                 Chosen::Picture(path) => self.save(Saved::Picture, path),
                 Chosen::Aov(path) => self.save(Saved::Planes, path),
                 Chosen::Scene(path) => self.save_scene(&path),
+                Chosen::NoDialog(kind) => self.without_dialog(kind),
             }
+        }
+    }
+
+    /// Saves into the folder that the program was started in, where there is no dialog to ask for another.
+    fn without_dialog(&mut self, kind: Kind) {
+        let folder = std::env::current_dir().unwrap_or_default();
+        match (kind, kind.instead(&folder)) {
+            (Kind::Picture, Some(path)) => self.save(Saved::Picture, path),
+            (Kind::Aov, Some(path)) => self.save(Saved::Planes, path),
+            (Kind::Scene, Some(path)) => self.save_scene(&path),
+            _ => self.tell(NO_DIALOG.to_owned(), true),
         }
     }
 

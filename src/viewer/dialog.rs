@@ -1,7 +1,8 @@
 //! File dialogs: asked for on the window's thread, as some systems want it, waited for on another.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
 
 use eframe::egui;
 
@@ -17,6 +18,31 @@ pub(super) enum Kind {
     Scene,
 }
 
+impl Kind {
+    /// What is proposed as the name of a file.
+    fn file_name(self) -> &'static str {
+        match self {
+            Self::Open => "",
+            Self::Picture => "catoptric.png",
+            Self::Aov => "catoptric.exr",
+            Self::Scene => "scene.toml",
+        }
+    }
+
+    /// Where to save if there is no dialog to ask with: a name in `folder` that no file has yet. `None` if nothing is saved.
+    pub(super) fn instead(self, folder: &Path) -> Option<PathBuf> {
+        let (stem, extension) = self.file_name().split_once('.')?;
+        let numbered = |n: u32| match n {
+            1 => folder.join(self.file_name()),
+            _ => folder.join(format!("{stem}-{n}.{extension}")),
+        };
+        (1..=9999).map(numbered).find(|path| !path.exists())
+    }
+}
+
+/// No hand cancels a dialog sooner: then the system had none to show.
+const SOONEST: Duration = Duration::from_millis(250);
+
 /// Asks; the answer comes through `to`, if there is one.
 pub(super) fn ask(kind: Kind, to: Sender<Chosen>, context: &egui::Context) {
     let dialog = rfd::AsyncFileDialog::new();
@@ -28,7 +54,7 @@ pub(super) fn ask(kind: Kind, to: Sender<Chosen>, context: &egui::Context) {
                 .set_title("Open a scene or models")
                 .add_filter("scenes and models", &[&["toml"], load::EXTENSIONS].concat());
             let waiting = dialog.pick_files();
-            wait(context, to, async move {
+            wait(kind, context, to, async move {
                 let files = waiting.await?;
                 Some(Chosen::Open(files.iter().map(|f| f.path().to_owned()).collect()))
             });
@@ -36,26 +62,26 @@ pub(super) fn ask(kind: Kind, to: Sender<Chosen>, context: &egui::Context) {
         Kind::Picture => {
             let dialog = dialog
                 .set_title("Save the picture")
-                .set_file_name("catoptric.png")
+                .set_file_name(kind.file_name())
                 .add_filter("pictures", &["png", "exr", "hdr"]);
             let waiting = dialog.save_file();
-            wait(context, to, async move { waiting.await.map(path).map(Chosen::Picture) });
+            wait(kind, context, to, async move { waiting.await.map(path).map(Chosen::Picture) });
         }
         Kind::Aov => {
             let dialog = dialog
                 .set_title("Save what mirrors show")
-                .set_file_name("catoptric.exr")
+                .set_file_name(kind.file_name())
                 .add_filter("multi-layer EXR", &["exr"]);
             let waiting = dialog.save_file();
-            wait(context, to, async move { waiting.await.map(path).map(Chosen::Aov) });
+            wait(kind, context, to, async move { waiting.await.map(path).map(Chosen::Aov) });
         }
         Kind::Scene => {
             let dialog = dialog
                 .set_title("Save the scene")
-                .set_file_name("scene.toml")
+                .set_file_name(kind.file_name())
                 .add_filter("scenes", &["toml"]);
             let waiting = dialog.save_file();
-            wait(context, to, async move {
+            wait(kind, context, to, async move {
                 let path: PathBuf = waiting.await.map(path)?;
                 Some(Chosen::Scene(path))
             });
@@ -64,12 +90,16 @@ pub(super) fn ask(kind: Kind, to: Sender<Chosen>, context: &egui::Context) {
 }
 
 fn wait(
+    kind: Kind,
     context: egui::Context,
     to: Sender<Chosen>,
     answer: impl Future<Output = Option<Chosen>> + Send + 'static,
 ) {
     let run = move || {
-        if let Some(chosen) = pollster::block_on(answer) {
+        let start = Instant::now();
+        let answer = pollster::block_on(answer);
+        let none = || (start.elapsed() < SOONEST).then_some(Chosen::NoDialog(kind));
+        if let Some(chosen) = answer.or_else(none) {
             // Nobody listens any more once the window is closed.
             let _ = to.send(chosen);
             context.request_repaint();

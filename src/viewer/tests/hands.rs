@@ -369,3 +369,25 @@ fn classes_caustics_and_all_paths_are_shown() {
         v.display.as_ref().is_some_and(|d| d.map.is_none() && d.caustic.is_empty())
     });
 }
+
+#[test]
+fn without_a_file_dialog_something_happens_all_the_same() {
+    use super::super::app::Chosen;
+    use super::super::dialog::Kind;
+    let (folder, path) = small();
+    let mut hands = opened(&path, [300.0, 200.0], without_panel());
+    hands.step();
+    until_drawn(&mut hands);
+    viewer_mut(&mut hands).chosen.0.send(Chosen::NoDialog(Kind::Open)).expect("it listens");
+    hands.step();
+    let message = viewer(&hands).message.clone().expect("it says so");
+    assert!(message.1 && message.0.contains("no file dialog"), "{message:?}");
+    // What is saved gets a name that no file has.
+    let first = Kind::Picture.instead(folder.path()).expect("a name");
+    assert_eq!(first, folder.path().join("catoptric.png"));
+    std::fs::write(&first, b"taken").expect("it is written");
+    let second = Kind::Picture.instead(folder.path());
+    assert_eq!(second, Some(folder.path().join("catoptric-2.png")));
+    assert_eq!(Kind::Scene.instead(folder.path()), Some(folder.path().join("scene.toml")));
+    assert_eq!(Kind::Open.instead(folder.path()), None);
+}

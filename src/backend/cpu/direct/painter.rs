@@ -55,10 +55,6 @@ pub(super) const MIDDLES: [([f64; 2], usize); 1 << SAMPLES] = {
     middles
 };
 
-/// Below this square of a cosine between a triangle's normal and the view, its neighbours may be turned away from its plane by
-/// more than it is itself (looked at on a torus).
-const FROM_THE_SIDE: f32 = 0.1;
-
 /// All samples of a pixel.
 const ALL: Group = Group((1 << SAMPLES) - 1);
 
@@ -188,27 +184,19 @@ impl<'a, A: Appearance> Painter<'a, A> {
         }
     }
 
-    /// Whether all triangles of a surface that a pixel shows have a corner in common with one of them, which is not seen from
-    /// the side: then that one, continued, shows what the others show. Where a mesh has an edge, its sides have corners of their
-    /// own.
+    /// Whether all triangles of a surface that a pixel shows have a corner in common with one of them: then that one, continued,
+    /// shows what the others show. Where a mesh has an edge, its sides have corners of their own.
     #[inline(always)]
     fn goes_on(&self, surface: usize, middle: u32, seen: &[Seen; SAMPLES]) -> bool {
         let visibility = self.view.visibility;
-        let mesh = &self.view.objects[surface - visibility.mirrors()];
-        let triangles = mesh.triangles;
+        let triangles = self.view.objects[surface - visibility.mirrors()].triangles;
         let first = visibility.ids(surface).start;
         let own = triangles[(middle - first) as usize];
-        let [a, b, c] = own.map(|corner| mesh.positions[corner as usize]);
-        let (normal, view) = ((b - a).cross(c - a), a - self.view.eye.position);
-        let upright = normal.length_squared() * view.length_squared();
-        normal.dot(view).powi(2) >= FROM_THE_SIDE * upright
-            && seen.iter().all(|other| {
-                other.surface != Some(surface)
-                    || other.id == middle
-                    || triangles[(other.id - first) as usize]
-                        .iter()
-                        .any(|corner| own.contains(corner))
-            })
+        seen.iter().all(|other| {
+            other.surface != Some(surface)
+                || other.id == middle
+                || triangles[(other.id - first) as usize].iter().any(|corner| own.contains(corner))
+        })
     }
 
     /// Remembers what a group of a pixel's samples shows of an object: as one, or triangle by triangle.
