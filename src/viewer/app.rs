@@ -98,6 +98,8 @@ pub(super) struct Viewer {
     pub(super) pinned: Option<Probed>,
     pub(super) help: bool,
     pub(super) chosen: (Sender<Chosen>, Receiver<Chosen>),
+    /// Where to save if the system has no dialog to ask with.
+    pub(super) folder: PathBuf,
     /// The canvas in pixels.
     pub(super) size: ImageSize,
     /// Where it begins in the window, pixels.
@@ -155,6 +157,7 @@ impl Viewer {
             pinned: None,
             help: false,
             chosen: channel(),
+            folder: std::env::current_dir().unwrap_or_default(),
             size: ImageSize { width: 1, height: 1 },
             canvas: [0; 2],
             posted: None,
@@ -209,10 +212,9 @@ impl Viewer {
         }
     }
 
-    /// Saves into the folder that the program was started in, where there is no dialog to ask for another.
+    /// Saves into a folder that nobody chose.
     fn without_dialog(&mut self, kind: Kind) {
-        let folder = std::env::current_dir().unwrap_or_default();
-        match (kind, kind.instead(&folder)) {
+        match (kind, kind.instead(&self.folder)) {
             (Kind::Picture, Some(path)) => self.save(Saved::Picture, path),
             (Kind::Aov, Some(path)) => self.save(Saved::Planes, path),
             (Kind::Scene, Some(path)) => self.save_scene(&path),

@@ -382,6 +382,10 @@ fn without_a_file_dialog_something_happens_all_the_same() {
     hands.step();
     let message = viewer(&hands).message.clone().expect("it says so");
     assert!(message.1 && message.0.contains("no file dialog"), "{message:?}");
+    viewer_mut(&mut hands).folder = folder.path().to_owned();
+    viewer_mut(&mut hands).chosen.0.send(Chosen::NoDialog(Kind::Aov)).expect("it listens");
+    let saved = folder.path().join("catoptric.exr");
+    until(&mut hands, "a file", |_| saved.exists());
     // What is saved gets a name that no file has.
     let first = Kind::Picture.instead(folder.path()).expect("a name");
     assert_eq!(first, folder.path().join("catoptric.png"));

@@ -71,8 +71,14 @@ fn small() -> (tempfile::TempDir, PathBuf) {
 fn opened<'a>(path: &Path, size: [f32; 2], settings: Settings) -> Hands<'a> {
     let opening = opening(&path.to_string_lossy());
     let mut settings = Some(settings);
+    // Hands that press everything save, too.
+    let saved = tempfile::tempdir().expect("a folder");
     let show = move |ui: &mut egui::Ui, viewer: &mut Option<Viewer>| {
-        let start = || Viewer::new(ui.ctx(), &opening, settings.take().unwrap_or_default());
+        let start = || {
+            let mut viewer = Viewer::new(ui.ctx(), &opening, settings.take().unwrap_or_default());
+            viewer.folder = saved.path().to_owned();
+            viewer
+        };
         viewer.get_or_insert_with(start).ui(ui);
     };
     Harness::builder().with_size(size).with_step_dt(0.05).build_ui_state(show, None)
