@@ -30,7 +30,7 @@ fn frames(criterion: &mut Criterion) {
         renderer.see(&scene, &eye);
         let made = method.prepare(&scene, params, &cx).expect("it can draw this");
         let mut frame = || {
-            let drawn = renderer.reflect(&scene, &eye, method, &made, params, false);
+            let drawn = renderer.reflect(&scene, &eye, method, &made, params, false, &cx);
             drawn.expect("it draws the scene").0.mirror_pixels
         };
         group.throughput(Throughput::Elements(frame() as u64));

@@ -365,7 +365,8 @@ fn splatting(criterion: &mut Criterion) {
         let made =
             c3rc.prepare(&scene, &params, &Context::default()).expect("there is nothing to make");
         let mut frame = || {
-            let drawn = renderer.reflect(&scene, &eye, c3rc, &made, &params, false);
+            let drawn =
+                renderer.reflect(&scene, &eye, c3rc, &made, &params, false, &Context::default());
             drawn.expect("it draws the scene").0.projections.unwrap_or(0)
         };
         group.throughput(Throughput::Elements(frame()));

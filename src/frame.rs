@@ -182,7 +182,7 @@ impl Renderer {
         let start = Instant::now();
         let ids_ms = self.see(scene, eye);
         cx.check()?;
-        let (mut report, _) = self.reflect(scene, eye, method, &made, params, planes)?;
+        let (mut report, _) = self.reflect(scene, eye, method, &made, params, planes, cx)?;
         cx.check()?;
         let composite = Instant::now();
         self.compose(scene, eye);
@@ -229,7 +229,8 @@ impl Renderer {
     /// The second stage: the reflection, for the eye that was last seen from.
     ///
     /// # Errors
-    /// The backend failed.
+    /// The backend failed, or the work was cancelled.
+    #[expect(clippy::too_many_arguments, reason = "what to draw, how, and how long")]
     pub fn reflect(
         &mut self,
         scene: &PreparedScene,
@@ -238,9 +239,10 @@ impl Renderer {
         made: &Made,
         params: &Params,
         planes: bool,
+        cx: &Context,
     ) -> Result<(FrameReport, ExecuteReport)> {
         let start = Instant::now();
-        let mut plan = Plan::default();
+        let mut plan = Plan { cx: cx.silent(), ..Plan::default() };
         let input = FrameInput { scene, eye, visibility: &self.visibility };
         method.plan(input, made, params, &mut plan)?;
         let planned_ms = milliseconds(start);

@@ -9,6 +9,8 @@ use glam::Vec3;
 use crate::camera::Eye;
 use crate::camera::reflector::cube::CubeMap;
 use crate::camera::three_ray::{ThreeRay, ViewVolume};
+use crate::context::Context;
+use crate::error::Result;
 use crate::geometry::Aabb;
 use crate::visibility::Patch;
 
@@ -181,7 +183,10 @@ pub struct GatherPass<'a> {
 /// A computation per mirror pixel, called on runs of pixels.
 pub trait GatherKernel: Send + Sync {
     /// Prepares what all pixels share (ray lists, say) and computes every pixel of the reflection.
-    fn gather(&self, out: &mut Reflection) -> GatherTimes;
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    fn gather(&self, out: &mut Reflection, cx: &Context) -> Result<GatherTimes>;
 }
 
 /// What a gather pass took.
@@ -299,6 +304,8 @@ pub struct Plan<'a> {
     pub times: PlanTimes,
     /// What the method cannot show in this scene, a sentence each.
     pub notes: Vec<String>,
+    /// Whoever executes it stops once this is cancelled.
+    pub cx: Context,
 }
 
 /// What planning took, milliseconds.

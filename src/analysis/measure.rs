@@ -89,8 +89,15 @@ impl<'a> Stage<'a> {
 
     fn run(&mut self, side: &Side) -> Result<FrameReport> {
         let Side { method, params, made, .. } = side;
-        let reflected =
-            self.renderer.reflect(self.scene, &self.eye, *method, made, params, false)?;
+        let reflected = self.renderer.reflect(
+            self.scene,
+            &self.eye,
+            *method,
+            made,
+            params,
+            false,
+            &Context::default(),
+        )?;
         Ok(reflected.0)
     }
 }

@@ -5,6 +5,8 @@ pub mod cpu;
 pub mod gpu;
 
 use crate::camera::Eye;
+#[cfg(any(feature = "gpu", test))]
+use crate::error::Error;
 use crate::error::Result;
 use crate::image::Picture;
 use crate::plan::{Plan, Reflection};
@@ -60,7 +62,7 @@ impl Backend for WithSpare {
     ) -> Result<ExecuteReport> {
         if let Some(first) = &mut self.first {
             let done = first.execute(plan, scene, visibility, planes, out);
-            if done.is_ok() {
+            if matches!(done, Ok(_) | Err(Error::Cancelled)) {
                 return done;
             }
             self.first = None;
@@ -127,7 +129,7 @@ pub trait Backend: Send {
     /// seen, which is not timed.
     ///
     /// # Errors
-    /// The device failed.
+    /// The device failed, or the plan was cancelled.
     ///
     /// # Panics
     /// If a pass reads what no pass before it wrote.
@@ -162,7 +164,6 @@ mod tests {
     use super::*;
     use crate::camera::eye::ImageSize;
     use crate::context::Context;
-    use crate::error::Error;
     use crate::frame::Renderer;
     use crate::methods::{Params, method};
     use crate::scene::description::{Environment, EyeDescription};

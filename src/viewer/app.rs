@@ -192,6 +192,8 @@ impl Viewer {
                     self.posted = None;
                 }
                 Event::Shot(shot) => self.take(context, *shot),
+                // The next ones are to be smaller, and drafts.
+                Event::GivenUp(ms) => self.moving_ms = self.moving_ms.max(ms),
                 Event::Probed(probed) => self.probed(*probed),
                 Event::Saved(path) => self.tell(format!("saved {}", path.display()), false),
             }
@@ -425,7 +427,7 @@ impl Viewer {
     }
 
     /// The scale at which pictures keep up with what moves.
-    fn scale(&self) -> f64 {
+    pub(super) fn scale(&self) -> f64 {
         if !self.settings.adapt || self.steady {
             return 1.0;
         }

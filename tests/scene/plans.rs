@@ -1,11 +1,14 @@
 //! Plans: every pass finds what it reads.
 
-use catoptric::Context;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
 use catoptric::backend::{Backend, cpu::Cpu, cpu::finish};
 use catoptric::geometry::Similarity;
 use catoptric::methods::{FrameInput, METHODS, Params};
-use catoptric::plan::{Plan, Reflection, Resource};
+use catoptric::plan::{Batch, BatchSource, CameraInstance, Pass, Plan, Reflection, Resource};
 use catoptric::visibility::{Scratch, Visibility};
+use catoptric::{Context, Error};
 use glam::DVec3;
 
 use super::{RED, eye, looks, moved, object, prepared, scene, shape};
@@ -64,4 +67,56 @@ fn swapped_and_lost_passes_are_found_out() {
         swapped += 1;
     });
     assert!(swapped > 0, "no method has two passes");
+}
+
+/// Culls for another, and cancels everything at the third camera.
+struct Cancelling<'a> {
+    inner: Box<dyn BatchSource + 'a>,
+    cancel: Arc<AtomicBool>,
+    asked: Arc<AtomicUsize>,
+}
+
+impl BatchSource for Cancelling<'_> {
+    fn cull(&self, camera: &CameraInstance, out: &mut Vec<Batch>) {
+        if self.asked.fetch_add(1, Ordering::Relaxed) == 2 {
+            self.cancel.store(true, Ordering::Relaxed);
+        }
+        self.inner.cull(camera, out);
+    }
+}
+
+#[test]
+fn execution_stops_where_it_is_cancelled() {
+    let mut splats = 0;
+    with_plans(|id, mut plan, scene, visibility| {
+        let out = &mut Reflection::default();
+        let cancel = plan.cx.cancel_flag();
+        if let Some(Pass::Splat(pass)) = plan.passes.first_mut() {
+            let asked = Arc::<AtomicUsize>::default();
+            let cameras = pass.cameras.len();
+            let none: Box<dyn BatchSource> = Box::new(Nothing);
+            let inner = std::mem::replace(&mut pass.batches, none);
+            let cancel = Arc::clone(&cancel);
+            pass.batches = Box::new(Cancelling { inner, cancel, asked: Arc::clone(&asked) });
+            let done = Cpu::default().execute(&plan, scene, visibility, false, out);
+            assert!(matches!(done, Err(Error::Cancelled)), "{id} went on");
+            let asked = asked.load(Ordering::Relaxed);
+            // Each thread ends the camera that it is at.
+            assert!(asked <= 3 + rayon::current_num_threads(), "{asked} of {cameras} cameras");
+            assert!(cameras > 20 + rayon::current_num_threads(), "{cameras} are too few to tell");
+            splats += 1;
+            return;
+        }
+        cancel.store(true, Ordering::Relaxed);
+        let done = Cpu::default().execute(&plan, scene, visibility, false, out);
+        assert!(matches!(done, Err(Error::Cancelled)) || id == "environment", "{id} went on");
+    });
+    assert_eq!(splats, 1);
+}
+
+/// Culls everything.
+struct Nothing;
+
+impl BatchSource for Nothing {
+    fn cull(&self, _: &CameraInstance, _: &mut Vec<Batch>) {}
 }

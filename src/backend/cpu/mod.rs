@@ -57,7 +57,8 @@ impl Backend for Cpu {
             match pass {
                 Pass::Splat(pass) => {
                     let (done, landed) =
-                        splat::splat(pass, &scene.surfels, visibility, &self.scratch);
+                        splat::splat(pass, &scene.surfels, visibility, &self.scratch, &plan.cx);
+                    plan.cx.check()?;
                     self.landed = landed;
                     add(&mut report.passes_ms, milliseconds(start));
                     report.cameras = Some(pass.cameras.len());
@@ -78,14 +79,15 @@ impl Backend for Cpu {
                     add(&mut report.passes_ms, milliseconds(start));
                 }
                 Pass::Gather(pass) => {
-                    add(&mut report.rays_ms, pass.kernel.gather(out).rays_ms);
+                    add(&mut report.rays_ms, pass.kernel.gather(out, &plan.cx)?.rays_ms);
                 }
                 Pass::Lookup(pass) => {
                     lookup::lookup(pass, scene, visibility, &lookup::by_cpu, out)?;
                     add(&mut report.passes_ms, milliseconds(start));
                 }
                 Pass::Search(pass) => {
-                    let done = search::search(pass, scene, visibility, &search::OnCpu, out)?;
+                    let here = search::OnCpu(&plan.cx);
+                    let done = search::search(pass, scene, visibility, &here, out)?;
                     add(&mut report.passes_ms, milliseconds(start));
                     done.enter(&mut report);
                 }

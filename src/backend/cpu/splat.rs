@@ -18,6 +18,7 @@ use self::hits::Hits;
 use self::packed::{Packed, Rest};
 pub(crate) use self::projection::Projection;
 use super::pool::Pool;
+use crate::context::Context;
 use crate::geometry::Surfels;
 use crate::geometry::lanes::{Pair, simd_level};
 use crate::geometry::surfel::PADDING;
@@ -97,12 +98,14 @@ pub(crate) struct Scratch {
     layers: Layers,
 }
 
-/// Runs the pass. Every pixel of a mirror belongs to one patch, so no pixel is in the lists twice.
+/// Runs the pass. Every pixel of a mirror belongs to one patch, so no pixel is in the lists twice. Once it is cancelled,
+/// what it returns is of no use.
 pub(crate) fn splat(
     pass: &SplatPass<'_>,
     surfels: &Surfels,
     visibility: &Visibility,
     pool: &Pool<Scratch>,
+    cx: &Context,
 ) -> (SplatCounters, Vec<Vec<Landed>>) {
     let level = simd_level();
     let start = || (pool.take(), SplatCounters::default(), Vec::new());
@@ -110,7 +113,7 @@ pub(crate) fn splat(
         .into_par_iter()
         .with_max_len(PATCHES)
         .fold(start, |(mut scratch, counters, mut landed), index| {
-            let work = PatchWork { pass, surfels, visibility, index, level, pool };
+            let work = PatchWork { pass, surfels, visibility, index, level, pool, cx };
             let more = work.run(&mut scratch, &mut landed);
             (scratch, counters.plus(more), landed)
         })
@@ -127,11 +130,12 @@ struct PatchWork<'a> {
     index: usize,
     level: Level,
     pool: &'a Pool<Scratch>,
+    cx: &'a Context,
 }
 
 impl PatchWork<'_> {
     fn run(&self, scratch: &mut Scratch, landed: &mut Vec<Landed>) -> SplatCounters {
-        let Self { pass, surfels, visibility, index, level, pool } = *self;
+        let Self { pass, surfels, visibility, index, level, pool, cx } = *self;
         let mut counters = SplatCounters::default();
         let patch = &pass.patches[index];
         let stride = patch.rect.width() + 2 * BORDER;
@@ -143,6 +147,10 @@ impl PatchWork<'_> {
         hits.len = 0;
         fill_tile(tile, pass, patch, visibility);
         for camera in &pass.cameras[cameras] {
+            // One that sees millions takes a second.
+            if cx.check().is_err() {
+                return counters;
+            }
             let start = Instant::now();
             batches.clear();
             pass.batches.cull(camera, batches);

@@ -276,6 +276,7 @@ impl Ready {
         out.environment_included = false;
         let mut report = ExecuteReport::default();
         for pass in &plan.passes {
+            plan.cx.check()?;
             match pass {
                 Pass::Splat(pass) => {
                     report = self.splat(pass, scene, visibility, planes, options, out)?;

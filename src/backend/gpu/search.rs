@@ -12,8 +12,9 @@ use super::pipelines::{compute, dispatch, group};
 use super::reflected::Rasteriser;
 use super::shaders;
 use crate::backend::cpu::lookup::Asked;
+use crate::backend::cpu::search::raster::rasterise;
 use crate::backend::cpu::search::raster::{Drawing, Hit};
-use crate::backend::cpu::search::{Job, OnCpu, SearchBackend};
+use crate::backend::cpu::search::{Job, SearchBackend};
 use crate::camera::reflector::Found;
 use crate::error::Result;
 use crate::plan::EnvironmentCube;
@@ -236,7 +237,7 @@ impl SearchBackend for OnDevice<'_> {
     fn rasterise(&self, drawing: &Drawing<'_>) -> Result<Vec<Hit>> {
         let drawn = self.searcher.borrow_mut().rasterise(self.gpu, drawing)?;
         // Pictures larger than the device's textures are drawn here.
-        drawn.map_or_else(|| OnCpu.rasterise(drawing), Ok)
+        Ok(drawn.unwrap_or_else(|| rasterise(drawing)))
     }
 }
 

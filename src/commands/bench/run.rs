@@ -206,7 +206,8 @@ pub(super) fn valid_share(
     let made = c3rc().prepare(scene, params, &Context::default())?;
     let mut renderer = Renderer::new();
     renderer.see(scene, eye);
-    let (counted, _) = renderer.reflect(scene, eye, c3rc(), &made, params, false)?;
+    let (counted, _) =
+        renderer.reflect(scene, eye, c3rc(), &made, params, false, &Context::default())?;
     Ok(counted.valid_share())
 }
 

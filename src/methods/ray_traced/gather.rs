@@ -11,6 +11,8 @@ use super::trace::{
 };
 use crate::accel::{Hit, Ray};
 use crate::camera::mirror_ray::{MirrorTriangle, RayScale, RaySource, weights_on_line};
+use crate::context::Context;
+use crate::error::Result;
 use crate::image::{Planes, Reason};
 use crate::plan::{GatherKernel, GatherTimes, Reflection};
 use crate::scene::prepared::milliseconds;
@@ -37,7 +39,7 @@ struct Sum {
 }
 
 impl GatherKernel for Kernel<'_> {
-    fn gather(&self, out: &mut Reflection) -> GatherTimes {
+    fn gather(&self, out: &mut Reflection, cx: &Context) -> Result<GatherTimes> {
         let size = self.frame.eye.size;
         let pixels = self.mirror_pixels();
         let mirrors: Vec<MirrorTriangle> = (0..self.frame.visibility.mirror_triangles())
@@ -46,6 +48,7 @@ impl GatherKernel for Kernel<'_> {
         let mut sums = vec![Sum { radiance: Vec3::ZERO, samples: 0, hits: 0 }; pixels.len()];
         let mut times = GatherTimes::default();
         for k in 0..self.spp {
+            cx.check()?;
             let samples = self.samples(&pixels, k);
             let (rays, hits, rays_ms) = self.trace(&samples, &mirrors);
             times.rays_ms += rays_ms;
@@ -73,7 +76,7 @@ impl GatherKernel for Kernel<'_> {
                 planes.coverage[pixel as usize] = sum.hits as f32 / n;
             }
         }
-        times
+        Ok(times)
     }
 }
 

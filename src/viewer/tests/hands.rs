@@ -284,6 +284,39 @@ fn loading_is_cancelled_by_its_button() {
 }
 
 #[test]
+fn slow_pictures_do_not_keep_others_waiting() {
+    let (folder, path) = small();
+    let mut hands = opened(&path, [400.0, 300.0], without_panel());
+    hands.step();
+    until_drawn(&mut hands);
+    let rays = |hands: &mut Hands<'_>, spp: u32| {
+        let side = &mut viewer_mut(hands).settings.sides[0];
+        side.method = "raytrace".into();
+        side.params.insert("spp".into(), spp.to_string());
+    };
+    // Minutes of work for a still picture, which another scene ends.
+    rays(&mut hands, 65_536);
+    for _ in 0..10 {
+        hands.step();
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let other = folder.path().join("other.toml");
+    std::fs::write(&other, SCENE.replace("\"small\"", "\"other\"")).expect("it is written");
+    drop_file(&mut hands, &other);
+    until(&mut hands, "another scene", |v| v.prepared.as_ref().is_some_and(|p| p.name == "other"));
+    // Moving ones end for newer ones, and are smaller from then on.
+    let start = Instant::now();
+    while viewer(&hands).scale() == 1.0 {
+        assert!(start.elapsed() < PATIENCE, "a moving picture was never given up");
+        viewer_mut(&mut hands).eye.position.x += 0.01;
+        hands.step();
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    rays(&mut hands, 1);
+    until_drawn(&mut hands);
+}
+
+#[test]
 fn small_and_large_windows_are_drawn() {
     let (_folder, path) = small();
     let mut hands = opened(&path, [200.0, 150.0], Settings::default());

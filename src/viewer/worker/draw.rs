@@ -9,8 +9,8 @@ use eframe::egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
 use super::{
-    Arrived, BackendChoice, Event, Inbox, Map, Prepared, Save, Saved, Shared, Shot, Side, View,
-    probe,
+    Arrived, BackendChoice, Drawing, Event, Inbox, Map, Prepared, Save, Saved, Shared, Shot, Side,
+    View, probe,
 };
 use crate::backend::{Backend, cpu::Cpu, fastest, gpu};
 use crate::camera::Eye;
@@ -105,8 +105,9 @@ impl Artist {
         self.scene.as_ref()?;
         if let Some(view) = inbox.view.take() {
             let flag = Arc::<AtomicBool>::default();
-            // Moving pictures are quick and are drawn to their end: else a fast hand would see none.
-            inbox.drawing = view.rest.then(|| Arc::clone(&flag));
+            let cancel = Arc::clone(&flag);
+            let (begun, own) = (Instant::now(), Arc::clone(&view));
+            inbox.drawing = Some(Drawing { cancel, begun, view: own });
             return Some(Work::View(view, flag));
         }
         if let Some(probe) = inbox.probe.take() {
@@ -125,7 +126,14 @@ impl Artist {
                 self.relight(generation, *scene, lit);
                 Ok(())
             }
-            Work::View(view, flag) => self.draw(view, &Context::cancelled_by(flag)),
+            Work::View(view, flag) => {
+                let (begun, rest) = (Instant::now(), view.rest);
+                let done = self.draw(view, &Context::cancelled_by(flag));
+                if !rest && matches!(done, Err(Error::Cancelled)) {
+                    self.shared.tell(Event::GivenUp(milliseconds(begun)));
+                }
+                done
+            }
             Work::Probe(probe) => {
                 let found = self.probe(&probe);
                 found.map(|found| self.shared.tell(Event::Probed(Box::new(found))))

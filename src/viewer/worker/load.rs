@@ -103,7 +103,10 @@ fn load(request: &LoadRequest, generation: u64, shared: &Shared, cx: &Context) -
         }
         let (source, placements) = (Arc::clone(&scene), Arc::clone(&placements));
         let arrived = Arrived { scene: ready, source, prepared, placements };
-        shared.post(|inbox| inbox.scene = Some(Box::new(arrived)));
+        shared.post(|inbox| {
+            inbox.scene = Some(Box::new(arrived));
+            inbox.stop_drawing(|d| d.view.generation != generation);
+        });
     }
     Ok(())
 }

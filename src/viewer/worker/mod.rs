@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use eframe::egui::ColorImage;
 use glam::{DVec3, Vec3};
@@ -143,6 +144,8 @@ pub(super) enum Event {
     /// For people: what failed.
     Failed(String),
     Shot(Box<Shot>),
+    /// A moving picture was given up after so many milliseconds.
+    GivenUp(f64),
     Probed(Box<Probed>),
     Saved(PathBuf),
 }
@@ -181,9 +184,28 @@ struct Inbox {
     view: Option<Arc<View>>,
     probe: Option<Probe>,
     saves: Vec<Save>,
-    /// Cancels the frame under way, if it may be.
-    drawing: Option<Arc<AtomicBool>>,
+    /// The picture under way.
+    drawing: Option<Drawing>,
     quit: bool,
+}
+
+/// A picture under way.
+struct Drawing {
+    cancel: Arc<AtomicBool>,
+    begun: Instant,
+    view: Arc<View>,
+}
+
+/// While things move, pictures are drawn to their end, else a fast hand would see none; unless they take longer.
+const QUICK: Duration = Duration::from_millis(500);
+
+impl Inbox {
+    /// Cancels the picture under way if nobody wants it any more.
+    fn stop_drawing(&mut self, is_unwanted: impl Fn(&Drawing) -> bool) {
+        if let Some(drawing) = self.drawing.take_if(|d| is_unwanted(d)) {
+            drawing.cancel.store(true, Ordering::Relaxed);
+        }
+    }
 }
 
 struct Shared {
@@ -262,10 +284,9 @@ impl Worker {
     /// Wishes to see this; what was wished before and is not yet drawn never will be.
     pub(super) fn view(&self, view: View) {
         self.shared.post(|inbox| {
+            let rest = view.rest;
             inbox.view = Some(Arc::new(view));
-            if let Some(flag) = inbox.drawing.take() {
-                flag.store(true, Ordering::Relaxed);
-            }
+            inbox.stop_drawing(|d| rest || d.view.rest || d.begun.elapsed() > QUICK);
         });
     }
 
@@ -295,9 +316,7 @@ impl Drop for Worker {
         self.cancel_load();
         self.shared.post(|inbox| {
             inbox.quit = true;
-            if let Some(flag) = inbox.drawing.take() {
-                flag.store(true, Ordering::Relaxed);
-            }
+            inbox.stop_drawing(|_| true);
         });
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();

@@ -21,6 +21,7 @@ use self::images::Reflecting;
 use self::raster::{Drawing, Hit};
 use crate::backend::ExecuteReport;
 use crate::camera::reflector::{Found, estalella, roger};
+use crate::context::Context;
 use crate::error::Result;
 use crate::plan::Reflection;
 use crate::plan::search::{Primitive, ReflectorPart, Search, SearchPass};
@@ -79,12 +80,12 @@ pub(crate) trait SearchBackend {
     fn rasterise(&self, drawing: &Drawing<'_>) -> Result<Vec<Hit>>;
 }
 
-/// Does both here.
-pub(crate) struct OnCpu;
+/// Does both here, until it is cancelled.
+pub(crate) struct OnCpu<'a>(pub(crate) &'a Context);
 
-impl SearchBackend for OnCpu {
+impl SearchBackend for OnCpu<'_> {
     fn find(&self, job: &Job<'_>) -> Result<Vec<Found>> {
-        Ok(find(job))
+        find(job, self.0)
     }
 
     fn rasterise(&self, drawing: &Drawing<'_>) -> Result<Vec<Hit>> {
@@ -92,11 +93,12 @@ impl SearchBackend for OnCpu {
     }
 }
 
-fn find(job: &Job<'_>) -> Vec<Found> {
+fn find(job: &Job<'_>, cx: &Context) -> Result<Vec<Found>> {
     /// Points a task: untuned.
     const CHUNK: usize = 256;
     let map = &job.part.map;
     let find = |&point: &Vec3| {
+        cx.check()?;
         let hidden = map.hides(job.eye, point);
         let found = match job.search {
             Search::Estalella(ends) => estalella::search(map, job.eye, point, hidden, ends),
@@ -105,7 +107,7 @@ fn find(job: &Job<'_>) -> Vec<Found> {
                 Found { hidden, ..roger::search(map, job.eye, point, ends) }
             }
         };
-        map.settled(found, point)
+        Ok(map.settled(found, point))
     };
     job.points.par_iter().with_min_len(CHUNK).map(find).collect()
 }

@@ -109,7 +109,7 @@ impl Drawing<'_> {
 }
 
 /// On the CPU.
-pub(super) fn rasterise(drawing: &Drawing<'_>) -> Vec<Hit> {
+pub(crate) fn rasterise(drawing: &Drawing<'_>) -> Vec<Hit> {
     let Drawing { eye, visibility, on_mirror, .. } = *drawing;
     let per_distance = 1.0 / drawing.farthest();
     let moved: Vec<Vec<Vec3>> = if on_mirror {

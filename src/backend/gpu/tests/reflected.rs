@@ -16,6 +16,7 @@ use crate::camera::eye::ImageSize;
 use crate::camera::reflector::exact::Surface;
 use crate::camera::reflector::tests::map;
 use crate::camera::three_ray::tests::Numbers;
+use crate::context::Context;
 use crate::plan::search::{Bend, ReflectorPart};
 use crate::scene::PreparedScene;
 use crate::visibility::{Scratch, Visibility};
@@ -74,7 +75,7 @@ fn trial() -> Trial {
 fn agrees(gpu: &Device, trial: &Trial, on_mirror: bool) -> Result<(), String> {
     let Trial { scene, eye, visibility, part, objects } = trial;
     let drawing = Drawing { eye, scene, visibility, part, objects, on_mirror };
-    let exact = OnCpu.rasterise(&drawing).expect("the CPU does not fail");
+    let exact = OnCpu(&Context::default()).rasterise(&drawing).expect("the CPU does not fail");
     let drawn = Rasteriser::new(gpu).and_then(|mut r| r.draw(gpu, &drawing));
     let found = drawn.map_err(|e| e.to_string())?.ok_or("too large")?;
     assert!(exact.len() > 4_000, "{} pixels", exact.len());
@@ -115,7 +116,7 @@ fn odd_sizes_are_copied_whole() {
         let Trial { scene, eye, visibility, part, objects } = &trial;
         let drawing = Drawing { eye, scene, visibility, part, objects, on_mirror: true };
         let found = rasteriser.draw(&gpu, &drawing).expect("it draws").expect("it fits");
-        let exact = OnCpu.rasterise(&drawing).expect("the CPU does not fail");
+        let exact = OnCpu(&Context::default()).rasterise(&drawing).expect("the CPU does not fail");
         let pixels = |hits: &[Hit]| hits.iter().map(|h| h.pixel).collect::<Vec<_>>();
         let shared =
             pixels(&exact).iter().filter(|p| pixels(&found).binary_search(p).is_ok()).count();

@@ -13,6 +13,7 @@ use crate::camera::reflector::cube::{CubeMap, directions};
 use crate::camera::reflector::exact::Surface;
 use crate::camera::reflector::tests::{Case, ELLIPSOID, SPHERE, apart_px, cases_of, map};
 use crate::camera::reflector::{Found, estalella};
+use crate::context::Context;
 use crate::plan::EnvironmentCube;
 use crate::plan::search::{Bend, ReflectorPart, Search};
 
@@ -60,7 +61,7 @@ fn agrees(gpu: &Device, trial: &Trial, search: Search) -> Result<(), String> {
         let part = &trial.parts[0];
         let job = Job { part, search, eye: eye.as_vec3(), px: 1e-3, points: &points };
         let on_device = searcher.find(gpu, &job).map_err(|e| e.to_string())?;
-        let on_cpu = OnCpu.find(&job).map_err(|e| e.to_string())?;
+        let on_cpu = OnCpu(&Context::default()).find(&job).map_err(|e| e.to_string())?;
         let px = |a: &Found, b: DVec3| apart_px(*eye, a.point.as_dvec3(), b);
         errors.extend(cases.iter().zip(&on_device).map(|(case, found)| px(found, case.exact)));
         for (a, b) in on_device.iter().zip(&on_cpu) {
