@@ -5,11 +5,11 @@ use fearless_simd::{Simd, dispatch};
 use glam::{DVec3, Vec3};
 
 use crate::accel::kd_tree::WideNode;
-use crate::backend::cpu::splat::{BORDER, EDGE_TOLERANCE, Projection};
+use crate::backend::cpu::splat::Projection;
 use crate::camera::three_ray::{ViewVolume, project};
 use crate::cull::{Culler, Decision, Open, Walk};
 use crate::geometry::lanes::simd_level;
-use crate::plan::{Batch, CameraInstance, SplatPass, SplatShape, Volume};
+use crate::plan::{Batch, CameraInstance, SplatPass, Volume};
 use crate::scene::PreparedScene;
 use crate::scene::prepared::Cloud;
 
@@ -134,23 +134,14 @@ impl Replay<'_> {
                 continue;
             }
             if patch.own.is_none() {
-                images += u32::from(image.within([EDGE_TOLERANCE; 3]));
+                images += u32::from(work.is_valid(image));
                 continue;
             }
             if !image.within(camera.guard) || pass.first_root_only && taken {
                 continue;
             }
             taken = true;
-            // Rounded as in the backend's tile, which has a border.
-            let offset = match pass.shape {
-                SplatShape::Ellipse | SplatShape::Square1 => BORDER as f32,
-                SplatShape::Square2 => BORDER as f32 - 0.5,
-            };
-            let [x, y, w] = work.place(image, offset);
-            let (right, bottom) = (patch.rect.width() as f32, patch.rect.height() as f32);
-            let inside =
-                0.0 <= x - offset && 0.0 <= y - offset && x < right + offset && y < bottom + offset;
-            images += u32::from(inside && w > 0.0);
+            images += u32::from(work.is_valid(image));
         }
         images
     }

@@ -108,6 +108,7 @@ pub(crate) fn run(
         screenshot: args.screenshot.clone(),
         started,
         memory: cx.memory(),
+        on_failure: Some(|what| eprintln!("error: {what}")),
     };
     let Some(outcome) = open(&opening, cx)? else { return Ok(()) };
     write_json(args.json.as_ref(), &figures(&outcome))?;

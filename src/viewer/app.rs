@@ -11,9 +11,11 @@ use glam::DVec3;
 
 use super::dialog::Kind;
 use super::gizmo::Handles;
+use super::placing::Moves;
 use super::settings::{MirrorColors, Settings, Shown};
 use super::worker::{
-    Event, LoadRequest, Map, Prepared, Probe, Probed, Save, Saved, Shot, Thing, View, What, Worker,
+    Errors, Event, LoadRequest, Map, Prepared, Probe, Probed, Save, Saved, Shot, Thing, View, What,
+    Worker,
 };
 use super::{Opening, canvas, navigation, panels};
 use crate::camera::eye::ImageSize;
@@ -32,6 +34,8 @@ const REST: Duration = Duration::from_millis(120);
 const SOON: Duration = Duration::from_nanos(1);
 /// What a picture may take while something moves, milliseconds.
 const BUDGET_MS: f64 = 33.0;
+/// Whoever waits longer is told so.
+const SLOW: Duration = Duration::from_millis(400);
 /// Pictures shrink by no more than this per axis while something moves.
 const LEAST_SCALE: f64 = 0.5;
 /// Reports that are kept for the plot.
@@ -57,7 +61,9 @@ pub(super) struct Display {
     pub(super) map: Option<TextureHandle>,
     pub(super) view: Arc<View>,
     pub(super) reports: Vec<FrameReport>,
-    pub(super) errors: Option<(f64, Option<f64>, f64)>,
+    pub(super) errors: Option<Errors>,
+    /// What the brightest colour of the map stands for.
+    pub(super) most: Option<f32>,
     pub(super) complete: bool,
     /// Straight lines on the caustic surface, scene space.
     pub(super) caustic: Vec<[glam::Vec3; 2]>,
@@ -93,6 +99,9 @@ pub(super) struct Viewer {
     pub(super) message: Option<(String, bool, Instant)>,
     pub(super) selected: Option<Thing>,
     pub(super) handles: Handles,
+    pub(super) moves: Moves,
+    /// Where the pointer was when it was last asked what is there, and of which picture.
+    pub(super) asked: Option<(egui::Pos2, u64)>,
     /// Under the pointer, and where it was clicked.
     pub(super) probed: Option<Probed>,
     pub(super) pinned: Option<Probed>,
@@ -105,6 +114,8 @@ pub(super) struct Viewer {
     /// Where it begins in the window, pixels.
     pub(super) canvas: [u32; 2],
     posted: Option<View>,
+    /// When.
+    posted_at: Instant,
     /// Eye, places and canvas of the last pass.
     wished: Option<(EyeDescription, Arc<Vec<Similarity>>, ImageSize)>,
     changed: Instant,
@@ -153,6 +164,8 @@ impl Viewer {
             message: None,
             selected: None,
             handles: Handles::default(),
+            moves: Moves::default(),
+            asked: None,
             probed: None,
             pinned: None,
             help: false,
@@ -161,6 +174,7 @@ impl Viewer {
             size: ImageSize { width: 1, height: 1 },
             canvas: [0; 2],
             posted: None,
+            posted_at: Instant::now(),
             wished: None,
             changed: Instant::now(),
             moving_ms: 0.0,
@@ -194,6 +208,13 @@ impl Viewer {
                 Event::Shot(shot) => self.take(context, *shot),
                 // The next ones are to be smaller, and drafts.
                 Event::GivenUp(ms) => self.moving_ms = self.moving_ms.max(ms),
+                Event::Compared(view, errors) => {
+                    if let Some(display) =
+                        self.display.as_mut().filter(|d| Arc::ptr_eq(&d.view, &view))
+                    {
+                        display.errors = Some(errors);
+                    }
+                }
                 Event::Probed(probed) => self.probed(*probed),
                 Event::Saved(path) => self.tell(format!("saved {}", path.display()), false),
             }
@@ -245,16 +266,15 @@ impl Viewer {
             self.is_prepared_anew = false;
             self.mirror_triangles = None;
         }
-        let objects = scene.objects.iter().map(|o| o.transform);
-        let placements = objects.chain(scene.mirrors.iter().map(|m| m.transform)).collect();
-        self.placements = Arc::new(placements);
         if self.takes_eye {
             self.eye = scene.eye;
         }
         self.takes_eye = false;
         self.selected = None;
+        self.moves.clear();
         (self.probed, self.pinned) = (None, None);
         self.scene = Some(scene);
+        self.placements = Arc::new(self.own_places());
     }
 
     /// Opens a scene file, or models beside the teapot.
@@ -358,6 +378,7 @@ impl Viewer {
             view: shot.view,
             reports: shot.reports,
             errors: shot.errors,
+            most: shot.most,
             complete: shot.complete,
             caustic: shot.caustic,
         });
@@ -365,10 +386,12 @@ impl Viewer {
 
     fn probed(&mut self, probed: Probed) {
         if probed.probe.pick {
-            self.selected = probed.thing;
+            // Handles would lie over what is looked into.
             if self.settings.inspect || self.settings.paths {
                 let kept = probed.reflected.is_some() || probed.point.is_some();
                 self.pinned = kept.then(|| probed.clone());
+            } else {
+                self.selected = probed.thing;
             }
         }
         self.probed = Some(probed);
@@ -458,7 +481,23 @@ impl Viewer {
         if news {
             self.worker.view(view.clone());
             self.posted = Some(view);
+            self.posted_at = Instant::now();
         }
+        if self.is_waiting() && since >= REST {
+            // It may have to say so.
+            context.request_repaint_after(SLOW);
+        }
+    }
+
+    /// Whether the picture that is wished for has not come yet.
+    fn is_waiting(&self) -> bool {
+        let shown = self.display.as_ref().map(|display| &*display.view);
+        self.posted.is_some() && self.posted.as_ref() != shown
+    }
+
+    /// Whether to say that a picture is being drawn.
+    pub(super) fn is_slow(&self) -> bool {
+        self.is_waiting() && self.posted_at.elapsed() >= SLOW && !self.steady
     }
 }
 
@@ -497,18 +536,41 @@ impl Viewer {
         }
     }
 
+    pub(super) fn undo(&mut self) {
+        if !self.moves.undo(&mut self.placements) {
+            self.tell("nothing was moved".to_owned(), false);
+        }
+    }
+
+    pub(super) fn redo(&mut self) {
+        if !self.moves.redo(&mut self.placements) {
+            self.tell("no move was undone".to_owned(), false);
+        }
+    }
+
+    /// Where the scene has its things.
+    pub(super) fn own_places(&self) -> Vec<Similarity> {
+        let Some(scene) = &self.scene else { return Vec::new() };
+        let objects = scene.objects.iter().map(|o| o.transform);
+        objects.chain(scene.mirrors.iter().map(|m| m.transform)).collect()
+    }
+
+    pub(super) fn put_all_back(&mut self) {
+        self.moves.begin(&self.placements);
+        self.placements = Arc::new(self.own_places());
+        self.moves.end(&self.placements);
+    }
+
     pub(super) fn look_from(&mut self, direction: DVec3) {
         self.eye = navigation::from_direction(&self.eye, direction);
     }
 
     /// Whether the command line's words alone do not make what is seen.
     pub(super) fn is_changed(&self) -> bool {
-        let Some(scene) = &self.scene else { return false };
-        let objects = scene.objects.iter().map(|o| o.transform);
-        let places = objects.chain(scene.mirrors.iter().map(|m| m.transform));
-        !places.eq(self.placements.iter().copied())
-            || self.mirror_triangles.is_some()
-            || self.is_prepared_anew
+        self.scene.is_some()
+            && (self.own_places() != *self.placements
+                || self.mirror_triangles.is_some()
+                || self.is_prepared_anew)
     }
 
     /// Whether the sliders say something else than what was prepared.

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::app::Viewer;
 use super::settings::Shown;
-use super::{navigation, overlay};
+use super::{legend, navigation, overlay};
 use crate::camera::eye::ImageSize;
 
 /// Radians a point of dragging.
@@ -44,6 +44,9 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
         handles(viewer, ui, &response);
         navigate(viewer, ui, &response);
         overlay::show(viewer, &ui.painter_at(rect), rect);
+        if let Some(display) = &viewer.display {
+            legend::show(display, &ui.painter_at(rect), rect);
+        }
         hints(viewer, ui, rect);
     });
 }
@@ -131,7 +134,11 @@ fn handles(viewer: &mut Viewer, ui: &egui::Ui, response: &egui::Response) {
     let Some(&place) = viewer.placements.get(at) else { return };
     let moved = viewer.handles.show(ui, response, &viewer.eye, &scene, (thing, place));
     if let Some(place) = moved {
+        viewer.moves.begin(&viewer.placements);
         Arc::make_mut(&mut viewer.placements)[at] = place;
+    }
+    if !ui.input(|i| i.pointer.any_down()) && !ui.ctx().egui_wants_keyboard_input() {
+        viewer.moves.end(&viewer.placements);
     }
 }
 
@@ -174,9 +181,10 @@ fn navigate(viewer: &mut Viewer, ui: &egui::Ui, response: &egui::Response) {
     {
         viewer.ask(share(at), true);
     } else if viewer.settings.inspect
-        && ui.input(|i| i.pointer.is_moving())
         && let Some(at) = response.hover_pos()
+        && viewer.asked != Some((at, viewer.shots))
     {
+        viewer.asked = Some((at, viewer.shots));
         viewer.ask(share(at), false);
     }
     if response.double_clicked() {

@@ -39,9 +39,10 @@ pub(super) fn equivalent(viewer: &Viewer) -> (String, Option<&'static str>) {
         }
         let eye = viewer.eye;
         for (flag, p) in [("--eye", eye.position), ("--target", eye.target)] {
-            let _ = write!(line, " {flag} {},{},{}", p.x, p.y, p.z);
+            let [x, y, z] = p.to_array().map(short);
+            let _ = write!(line, " {flag} {x},{y},{z}");
         }
-        let _ = write!(line, " --fov {}", eye.fov_y.to_degrees());
+        let _ = write!(line, " --fov {}", short(eye.fov_y.to_degrees()));
     }
     // A saved scene names files wherever they are.
     let named = |s: &Option<Source>| matches!(s, Some(Source::File { .. }));
@@ -77,6 +78,13 @@ pub(super) fn equivalent(viewer: &Viewer) -> (String, Option<&'static str>) {
     (line, moved.then_some("save the scene as scene.toml first"))
 }
 
+/// Without the last digits, which rounding left: what nobody sees in a picture.
+fn short(value: f64) -> f64 {
+    let rounded = (value * 1e9).round() * 1e-9;
+    // Once more as text: the product has such digits itself.
+    format!("{rounded:.9}").parse().unwrap_or(value)
+}
+
 /// Appends a word as a shell takes it.
 fn word(line: &mut String, text: &str) {
     let plain = |c: char| c.is_alphanumeric() || "-_./:=+,".contains(c);
@@ -90,6 +98,15 @@ fn word(line: &mut String, text: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let shown = |v: f64| short(v).to_string();
+        assert_eq!(shown(-0.600_000_000_000_000_1), "-0.6");
+        assert_eq!(shown(45.0_f64.to_radians().to_degrees()), "45");
+        assert_eq!(shown(123.456_789_012_345), "123.456789012");
+        assert_eq!(shown(1e22), "10000000000000000000000");
+    }
 
     #[test]
     fn words_reach_the_program_as_they_are() {

@@ -65,7 +65,7 @@ impl Handles {
         (sound && scale.is_finite()).then_some(placed)
     }
 
-    fn pivot(&mut self, scene: &Scene, thing: Thing) -> DVec3 {
+    pub(super) fn pivot(&mut self, scene: &Scene, thing: Thing) -> DVec3 {
         if let Some((same, pivot)) = self.pivot
             && same == thing
         {

@@ -10,10 +10,12 @@ mod canvas;
 mod command;
 mod dialog;
 mod gizmo;
+mod legend;
 mod measure;
 mod navigation;
 mod overlay;
 mod panels;
+mod placing;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -51,6 +53,8 @@ pub struct Opening {
     pub started: Instant,
     /// How much memory loading may take.
     pub memory: Option<MemoryLimit>,
+    /// Told what failed, besides the window: files that cannot be opened, say.
+    pub on_failure: Option<fn(&str)>,
 }
 
 impl Opening {

@@ -11,6 +11,9 @@ const ZOOM_STEP: std::ops::RangeInclusive<f64> = 0.2..=5.0;
 /// A view is kept between these distances to its target, as shares of the scene's size.
 const DISTANCES: [f64; 2] = [1e-4, 1e3];
 
+/// What is framed leaves a little of the view free.
+const FRAME: f64 = 1.05;
+
 /// Directions to look from, with names. World space, for up = y.
 pub(super) const PRESETS: [(&str, DVec3); 6] = [
     ("front", DVec3::new(0.0, 0.3, 1.0)),
@@ -93,11 +96,19 @@ pub(super) fn fly(eye: &EyeDescription, by: DVec3) -> EyeDescription {
 /// Looks the same way at the middle of a box, from where all of it is in a view of this width by height.
 pub(super) fn frame(eye: &EyeDescription, bounds: [DVec3; 2], aspect: f64) -> EyeDescription {
     let middle = 0.5 * (bounds[0] + bounds[1]);
-    let radius = 0.5 * (bounds[1] - bounds[0]).length().max(1e-9);
-    let half = (0.5 * eye.fov_y).tan();
-    let half = half.min(half * aspect).atan();
-    let [.., forward] = axes(eye);
-    EyeDescription { position: middle - forward * (radius / half.sin()), target: middle, ..*eye }
+    let half = 0.5 * (bounds[1] - bounds[0]);
+    let high = (0.5 * eye.fov_y).tan();
+    let wide = high * aspect;
+    let [right, up, forward] = axes(eye);
+    let distance = (0..8_usize)
+        .map(|i| {
+            let sign = |k: usize| if i >> k & 1 == 0 { -1.0 } else { 1.0 };
+            let corner = half * DVec3::new(sign(0), sign(1), sign(2));
+            let across = (corner.dot(right).abs() / wide).max(corner.dot(up).abs() / high);
+            across * FRAME - corner.dot(forward)
+        })
+        .fold(half.length().max(1e-9), f64::max);
+    EyeDescription { position: middle - forward * distance, target: middle, ..*eye }
 }
 
 /// Looks at the target from a direction, at the same distance.
@@ -195,6 +206,15 @@ mod tests {
             let px = seen(&framed, dvec3(pick(0), pick(1), pick(2)));
             assert!((0.0..=300.0).contains(&px.x) && (0.0..=200.0).contains(&px.y), "{px}");
         }
+        // And not much smaller than it.
+        let corners = (0..8_usize).map(|i| {
+            let pick = |k: usize| bounds[i >> k & 1][k];
+            seen(&framed, dvec3(pick(0), pick(1), pick(2)))
+        });
+        let middle = DVec2::new(150.0, 100.0);
+        let reach =
+            corners.map(|px| ((px - middle) / middle).abs().max_element()).fold(0.0, f64::max);
+        assert!(reach > 0.9, "{reach}");
         let turn = axes(&framed)[2].dot(axes(&eye())[2]);
         assert!(turn > 1.0 - 1e-12, "the direction stays");
     }

@@ -10,6 +10,8 @@ use crate::camera::Eye;
 
 /// So many boxes and surfels are drawn at most: more is a blur.
 const MOST: usize = 4000;
+/// So many are drawn large.
+const FEW: usize = 300;
 const EDGES: [(usize, usize); 12] = [
     (0, 1),
     (1, 3),
@@ -105,8 +107,8 @@ fn draw(trace: &CameraTrace, painter: &egui::Painter, place: &impl Fn(Vec3) -> O
     for visited in trace.clouds.iter().flat_map(|cloud| &cloud.boxes) {
         let color = match visited.outcome {
             Outcome::Refused | Outcome::TurnedAway => continue,
-            Outcome::Opened => Color32::from_rgba_unmultiplied(90, 160, 255, 50),
-            _ => Color32::from_rgba_unmultiplied(255, 220, 80, 130),
+            Outcome::Opened => Color32::from_rgba_unmultiplied(90, 160, 255, 110),
+            _ => Color32::from_rgba_unmultiplied(255, 220, 80, 190),
         };
         boxes += 1;
         if boxes > MOST {
@@ -116,16 +118,6 @@ fn draw(trace: &CameraTrace, painter: &egui::Painter, place: &impl Fn(Vec3) -> O
             line(visited.corners[a], visited.corners[b], Stroke::new(1.0, color));
         }
     }
-    for surfel in trace.clouds.iter().flat_map(|cloud| &cloud.surfels).take(MOST) {
-        let color = if surfel.valid {
-            Color32::from_rgb(80, 255, 120)
-        } else {
-            Color32::from_rgb(255, 70, 60)
-        };
-        if let Some(at) = place(surfel.position) {
-            painter.circle_filled(at, 1.5, color);
-        }
-    }
     let reach = trace.clouds.iter().map(|cloud| cloud.lambda[1]).fold(0.0, f32::max);
     let ends = [0, 1, 2].map(|i| trace.corners[i] + trace.directions[i] * reach.min(1e6));
     for i in 0..3 {
@@ -133,5 +125,19 @@ fn draw(trace: &CameraTrace, painter: &egui::Painter, place: &impl Fn(Vec3) -> O
         line(trace.corners[i], trace.corners[next], Stroke::new(2.0, Color32::WHITE));
         line(trace.corners[i], ends[i], Stroke::new(1.5, Color32::from_rgb(255, 120, 220)));
         line(ends[i], ends[next], Stroke::new(1.0, Color32::from_rgb(255, 120, 220)));
+    }
+    // Over all lines, and those that are seen over those that are not: few are to be found, many not to be a blot.
+    for (valid, color) in
+        [(false, Color32::from_rgb(255, 70, 60)), (true, Color32::from_rgb(80, 255, 120))]
+    {
+        let surfels = trace.clouds.iter().flat_map(|cloud| &cloud.surfels);
+        let like = surfels.filter(|surfel| surfel.valid == valid);
+        let few = valid && like.clone().count() < FEW;
+        for at in like.take(MOST).filter_map(|surfel| place(surfel.position)) {
+            if few {
+                painter.circle_filled(at, 3.5, Color32::BLACK);
+            }
+            painter.circle_filled(at, if few { 2.5 } else { 1.2 }, color);
+        }
     }
 }

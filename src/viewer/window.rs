@@ -101,6 +101,9 @@ struct Window {
     remembers: bool,
     left: Left,
     scale: f32,
+    /// Whom failures are told to, and when the last one was.
+    on_failure: Option<fn(&str)>,
+    failed: Option<Instant>,
 }
 
 impl Window {
@@ -122,6 +125,8 @@ impl Window {
             closing: false,
             remembers,
             left,
+            on_failure: opening.on_failure.filter(|_| remembers),
+            failed: None,
         }
     }
 
@@ -210,6 +215,12 @@ impl eframe::App for Window {
         context.set_theme(egui::ThemePreference::from(self.viewer.settings.theme));
         self.rescale(&context);
         self.viewer.ui(ui);
+        if let (Some(on_failure), Some((what, true, at))) = (self.on_failure, &self.viewer.message)
+            && self.failed != Some(*at)
+        {
+            self.failed = Some(*at);
+            on_failure(what);
+        }
         if let Some(course) = &mut self.course {
             // Of the pass before: with painting.
             let before = f64::from(frame.info().cpu_usage.unwrap_or(0.0)) * 1e3;

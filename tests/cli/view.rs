@@ -2,7 +2,7 @@
 //! it says so; CATOPTRIC_REQUIRE_DISPLAY=1 makes that a failure.
 
 use std::fs;
-use std::io::Write as _;
+use std::io::{BufRead as _, Write as _};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -236,6 +236,29 @@ fn a_mouse_and_keys_drive_it() {
     display.hands("key ctrl+q");
     let run = Run::of("view".into(), child);
     assert_eq!(run.code, Some(0), "{}", run.err);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_opened_is_told_where_it_was_called_too() {
+    let folder = Folder::new();
+    folder.write("bad.ply", "ply\nformat ascii 1.0\nelement vertex 3\n");
+    let Some(display) = Display::open(&folder) else { return };
+    let mut child = display
+        .command(&folder, "view bad.ply --size 640x480")
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = String::new();
+    let mut lines = std::io::BufReader::new(child.stderr.take().unwrap());
+    while !said.contains("error") {
+        assert!(lines.read_line(&mut said).unwrap() > 0, "nothing was said: {said}");
+    }
+    assert!(said.contains("bad.ply"), "{said}");
+    assert!(child.try_wait().unwrap().is_none(), "the window stays");
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
 }
 
 #[cfg(unix)]

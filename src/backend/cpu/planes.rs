@@ -107,7 +107,7 @@ fn of_patch(
                 if !image.found || image.linear(camera.front) <= 0.0 {
                     continue;
                 }
-                seen.images += u32::from(image.within([super::splat::EDGE_TOLERANCE; 3]));
+                seen.images += u32::from(work.is_valid(image));
                 // Newton in the batch's narrower λ range may have ended on a neighbouring float: the nearest in
                 // depth is the one.
                 let apart =
@@ -120,6 +120,8 @@ fn of_patch(
                     seen.splat = [x + left, y + top];
                 }
             }
+            // The one that is seen may lie beside the camera's part of the picture.
+            seen.images = seen.images.max(1);
             list.push(seen);
         }
     }

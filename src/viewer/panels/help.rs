@@ -4,13 +4,13 @@ use eframe::egui;
 
 use super::super::app::Viewer;
 
-const ROWS: [(&str, &str); 21] = [
+const ROWS: [(&str, &str); 22] = [
     ("drag", "orbit about the middle"),
     ("right drag, Shift + drag", "pan"),
     ("wheel, pinch", "zoom to the pointer"),
     ("Ctrl + drag", "look around"),
     ("W A S D, Q E", "fly; Shift: faster"),
-    ("click", "select; drag its handles to move, turn, scale"),
+    ("click", "select; drag arrows to move, arcs to turn, the ring to scale"),
     ("double click", "look at what is selected"),
     ("Esc", "select nothing, close messages"),
     ("Home, R", "the scene's own view"),
@@ -20,6 +20,7 @@ const ROWS: [(&str, &str); 21] = [
     ("I", "inspect: the camera under the pointer; click keeps it"),
     ("P", "side panel"),
     ("H, F1", "this sheet"),
+    ("Ctrl + Z, Ctrl + Y", "undo a move, make it again"),
     ("Ctrl + O", "open a scene or models"),
     ("Ctrl + S", "save the picture"),
     ("Ctrl + Q", "quit"),

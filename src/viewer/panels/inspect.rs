@@ -98,7 +98,7 @@ fn rows(probed: &Probed, scene: &Scene) -> Vec<(&'static str, String)> {
         rows.push(("camera draws", format!("{} pixels", trace.pixels)));
         rows.push(("objects culled", trace.clouds.len().to_string()));
         rows.push(("boxes visited", sum(|c| c.boxes.len()).to_string()));
-        rows.push(("surfels", format!("{surfels}, {valid} valid, {} rejected", surfels - valid)));
+        rows.push(("surfels", format!("{valid} valid, {} rejected", surfels - valid)));
     }
     rows
 }

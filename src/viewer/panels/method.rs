@@ -31,9 +31,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
             ui.selectable_value(&mut viewer.settings.shown, shown, word);
         }
     });
-    if viewer.settings.shown != Shown::Divider
-        && let Some((rmse, psnr, flip)) = viewer.display.as_ref().and_then(|d| d.errors)
-    {
+    if let Some((rmse, psnr, flip)) = viewer.display.as_ref().and_then(|d| d.errors) {
         let psnr = psnr.map_or("equal".into(), |db| format!("{db:.1} dB"));
         ui.label(format!("RMSE {rmse:.4} · PSNR {psnr} · FLIP {flip:.4}"));
     }

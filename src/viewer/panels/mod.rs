@@ -12,13 +12,17 @@ use super::app::{Chosen, Viewer};
 use super::command;
 use super::dialog::{self, Kind};
 use super::navigation::PRESETS;
-use super::settings::Theme;
+use super::settings::{Settings, Theme};
 
 /// The side panel is left out of windows narrower than this, points.
 const NARROW: f32 = 520.0;
 
 pub(super) const OPEN: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::O);
 pub(super) const SAVE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::S);
+pub(super) const UNDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Z);
+pub(super) const REDO: KeyboardShortcut =
+    KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
+const REDO_TOO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Y);
 pub(super) const QUIT: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Q);
 
 /// Shortcuts.
@@ -35,6 +39,13 @@ pub(super) fn keys(viewer: &mut Viewer, context: &egui::Context) {
     }
     if hit(&QUIT) {
         context.send_viewport_cmd(egui::ViewportCommand::Close);
+    }
+    // The longer one first: the shorter one is part of it.
+    if hit(&REDO) || hit(&REDO_TOO) {
+        viewer.redo();
+    }
+    if hit(&UNDO) {
+        viewer.undo();
     }
     let pressed = |key| context.input_mut(|i| i.consume_key(Modifiers::NONE, key));
     if pressed(Key::Home) || pressed(Key::R) {
@@ -57,6 +68,7 @@ pub(super) fn keys(viewer: &mut Viewer, context: &egui::Context) {
             viewer.help = false;
         } else {
             (viewer.selected, viewer.pinned, viewer.message) = (None, None, None);
+            viewer.probed = None;
         }
     }
     if pressed(Key::F1) || pressed(Key::H) {
@@ -73,15 +85,16 @@ pub(super) fn keys(viewer: &mut Viewer, context: &egui::Context) {
 pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
     let width = ui.available_width();
     egui::Panel::top("bar").show(ui, |ui| {
-        egui::ScrollArea::horizontal().show(ui, |ui| bar(viewer, ui));
+        bar(viewer, ui);
     });
     if ui.available_height() > 100.0 {
         egui::Panel::bottom("status").show(ui, |ui| timing::status(viewer, ui));
     }
     if viewer.settings.panel && width >= NARROW {
-        let panel = egui::Panel::right("side").default_size(290.0).size_range(220.0..=520.0);
+        let panel = egui::Panel::right("side").default_size(300.0).size_range(220.0..=520.0);
         panel.show(ui, |ui| {
-            egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| side(viewer, ui));
+            // Long lines are scrolled to: the picture keeps its size.
+            egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| side(viewer, ui));
         });
     }
     help::show(viewer, ui.ctx());
@@ -108,8 +121,9 @@ fn side(viewer: &mut Viewer, ui: &mut egui::Ui) {
 }
 
 fn bar(viewer: &mut Viewer, ui: &mut egui::Ui) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.menu_button("File", |ui| file_menu(viewer, ui));
+        ui.menu_button("Edit", |ui| edit_menu(viewer, ui));
         ui.menu_button("View", |ui| view_menu(viewer, ui));
         ui.toggle_value(&mut viewer.settings.compare, "Compare")
             .on_hover_text("two methods, with a divider between them (C)");
@@ -152,6 +166,28 @@ fn file_menu(viewer: &mut Viewer, ui: &mut egui::Ui) {
     ui.separator();
     if ui.add(egui::Button::new("Quit").shortcut_text(shortcut(&QUIT))).clicked() {
         ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+    }
+}
+
+fn edit_menu(viewer: &mut Viewer, ui: &mut egui::Ui) {
+    let context = ui.ctx().clone();
+    let shortcut = |keys: &KeyboardShortcut| context.format_shortcut(keys);
+    if ui.add(egui::Button::new("Undo move").shortcut_text(shortcut(&UNDO))).clicked() {
+        viewer.undo();
+    }
+    if ui.add(egui::Button::new("Redo move").shortcut_text(shortcut(&REDO))).clicked() {
+        viewer.redo();
+    }
+    ui.separator();
+    if ui.button("Everything back in its place").on_hover_text("as the scene has it").clicked() {
+        viewer.put_all_back();
+    }
+    if ui
+        .button("Settings as at first")
+        .on_hover_text("methods, parameters, maps, theme and size of text")
+        .clicked()
+    {
+        viewer.settings = Settings::default();
     }
 }
 

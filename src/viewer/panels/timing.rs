@@ -33,6 +33,9 @@ pub(super) fn status(viewer: &Viewer, ui: &mut egui::Ui) {
             ui.label(format!("{} · {} · {ms:.0} ms", report.method, report.backend));
         }
         ui.label(format!("{} × {}", size.width, size.height));
+        if viewer.is_slow() {
+            ui.label("drawing …");
+        }
         if let Some(prepared) = &viewer.prepared {
             let more = if prepared.complete { "" } else { " (more to come)" };
             ui.label(format!("{} surfels{more}", prepared.surfels));

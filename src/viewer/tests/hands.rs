@@ -1,7 +1,7 @@
 //! What a user does, and what is to happen then.
 
 use eframe::egui::{Key, Modifiers, PointerButton};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT as _, Queryable};
 
 use super::super::settings::MirrorColors;
 use super::super::worker::{Saved, Thing};
@@ -107,6 +107,57 @@ fn what_is_clicked_is_selected_and_moves_with_its_handles() {
     // It comes out in a new light, too: shadows follow.
     let shots = viewer(&hands).shots;
     until(&mut hands, "new shadows", |v| v.shots > shots);
+    // A drag is one move.
+    hands.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    hands.step();
+    assert_eq!(viewer(&hands).placements, before, "undone");
+    hands.key_press_modifiers(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
+    hands.step();
+    assert_eq!(viewer(&hands).placements[0], after, "made again");
+    viewer_mut(&mut hands).put_all_back();
+    assert_eq!(viewer(&hands).placements, before);
+    hands.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    hands.step();
+    assert_eq!(viewer(&hands).placements[0], after, "that can be undone, too");
+    until_drawn(&mut hands);
+}
+
+#[test]
+fn numbers_place_what_is_selected() {
+    let (_folder, path) = small();
+    let mut hands = opened(&path, [900.0, 1400.0], Settings::default());
+    hands.step();
+    until_drawn(&mut hands);
+    let before = Arc::clone(&viewer(&hands).placements);
+    viewer_mut(&mut hands).selected = Some(Thing::Object(0));
+    hands.step();
+    hands.step();
+    assert_eq!(viewer(&hands).placements, before, "nothing moves by being shown");
+    assert!(hands.query_by_label("put back").is_some_and(|b| b.accesskit_node().is_disabled()));
+    // The ball's middle is at 1.1, 0.25, 0.6.
+    let x = hands
+        .get_all_by_role(egui::Role::SpinButton)
+        .find(|n| n.accesskit_node().numeric_value().is_some_and(|v| (v - 1.1).abs() < 1e-3));
+    x.expect("a field for x").click();
+    hands.step();
+    hands.step();
+    hands.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    hands.event(egui::Event::Text("-0.75".into()));
+    hands.step();
+    hands.key_press(Key::Enter);
+    for _ in 0..3 {
+        hands.step();
+    }
+    let moved = viewer(&hands).placements[0].translation - before[0].translation;
+    assert!((moved - glam::DVec3::new(-1.85, 0.0, 0.0)).length() < 1e-3, "{moved}");
+    hands.get_by_label("put back").click();
+    hands.step();
+    hands.step();
+    assert_eq!(viewer(&hands).placements, before);
+    hands.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    hands.step();
+    assert_ne!(viewer(&hands).placements, before, "undone");
+    until_drawn(&mut hands);
 }
 
 #[test]
@@ -250,6 +301,15 @@ fn methods_are_changed_and_compared() {
     let errors = |hands: &Hands<'_>| viewer(hands).display.as_ref().and_then(|d| d.errors);
     let (rmse, psnr, flip) = errors(&hands).expect("they are there");
     assert_eq!((rmse, psnr, flip), (0.0, None, 0.0), "the same on both sides");
+    // Beside the divider, too: they come after the picture.
+    viewer_mut(&mut hands).settings.shown = super::super::settings::Shown::Divider;
+    hands.step();
+    until(&mut hands, "errors without a map", |v| {
+        v.display.as_ref().is_some_and(|d| d.map.is_none() && d.errors.is_some())
+    });
+    hands.step();
+    hands.get_by_label_contains("RMSE");
+    viewer_mut(&mut hands).settings.shown = super::super::settings::Shown::Flip;
     viewer_mut(&mut hands).settings.sides[0].method = "c3rc".into();
     hands.step();
     until_drawn(&mut hands);
@@ -356,8 +416,25 @@ fn a_pixel_of_the_mirror_tells_what_it_shows() {
     assert!((weights - 1.0).abs() < 1e-4);
     assert!(shown.position.expect("known").y.abs() < 0.02, "on the ground: {:?}", shown.position);
     assert!(shown.lambda.expect("known") > 0.0 && shown.surfel.is_some());
+    assert!(shown.images.expect("known") >= 1, "what is seen has an image");
     let trace = kept.trace.expect("c3rc has cameras");
     assert!(trace.clouds.iter().any(|c| c.surfels.iter().any(|s| s.valid)));
+    assert_eq!(viewer(&hands).selected, None, "no handles lie over it");
+    hands.key_press(Key::Escape);
+    hands.step();
+    assert!(viewer(&hands).pinned.is_none() && viewer(&hands).probed.is_none(), "let go");
+    // The pointer jumps there, and rests.
+    let at = on_canvas(&hands, 0.5, 0.55);
+    hands.event(egui::Event::PointerMoved(at));
+    hands.step();
+    until(&mut hands, "what is under the pointer", |v| {
+        v.probed.as_ref().is_some_and(|p| p.trace.is_some() && !p.probe.pick)
+    });
+    // A new picture is asked anew.
+    viewer_mut(&mut hands).probed = None;
+    viewer_mut(&mut hands).eye.position.x += 0.05;
+    until_drawn(&mut hands);
+    until(&mut hands, "what is there now", |v| v.probed.is_some());
 }
 
 #[test]

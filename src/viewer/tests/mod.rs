@@ -57,6 +57,7 @@ fn opening(input: &str) -> Opening {
         screenshot: None,
         started: Instant::now(),
         memory: None,
+        on_failure: None,
     }
 }
 

@@ -87,6 +87,7 @@ fn screenshots_of_the_readme() {
     viewer_mut(&mut hands).settings.compare = true;
     hands.step();
     until_drawn(&mut hands);
+    until(&mut hands, "figures", |v| v.display.as_ref().is_some_and(|d| d.errors.is_some()));
     take(&mut hands, "viewer-compare.png");
     let settings = &mut viewer_mut(&mut hands).settings;
     (settings.compare, settings.inspect) = (false, true);

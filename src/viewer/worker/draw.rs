@@ -198,6 +198,7 @@ impl Artist {
             map: None,
             caustic: Vec::new(),
             errors: None,
+            most: None,
             complete: stage.prepared.complete,
             view: Arc::clone(&view),
         };
@@ -215,8 +216,7 @@ impl Artist {
         match (view.map, used.as_slice()) {
             (Map::Difference | Map::Flip, &[a, b]) => {
                 let (a, b) = (self.renderers[a].2.picture(), self.renderers[b].2.picture());
-                let side = |picture| compare::Side { picture, planes: None };
-                let found = compare::compare(side(a), side(b), &Set::All)?;
+                let found = compared(a, b)?;
                 shot.errors = Some((found.rmse, found.psnr, found.flip));
                 shot.map = Some(match view.map {
                     Map::Flip => heat_map(&found, [a.width, a.height]),
@@ -225,7 +225,11 @@ impl Artist {
             }
             (Map::Cost, &[first, ..]) => {
                 let visibility = self.renderers[first].2.visibility();
-                shot.map = probe::costs(&stage.scene, &eye, visibility, &view.sides[0])?;
+                if let Some((map, most)) =
+                    probe::costs(&stage.scene, &eye, visibility, &view.sides[0])?
+                {
+                    (shot.map, shot.most) = (Some(map), Some(most));
+                }
             }
             (Map::Class, &[first, ..]) => {
                 let visibility = self.renderers[first].2.visibility();
@@ -239,9 +243,17 @@ impl Artist {
         if view.rest {
             stage.light(&self.shared);
         }
-        self.last = Some(view);
+        self.last = Some(Arc::clone(&view));
         shot.ms = milliseconds(start);
+        let known = shot.errors.is_some();
         self.shared.tell(Event::Shot(Box::new(shot)));
+        // Figures can wait: not for them is a picture late.
+        if let (true, false, &[a, b]) = (view.rest, known, used.as_slice())
+            && self.shared.inbox().view.is_none()
+        {
+            let found = compared(self.renderers[a].2.picture(), self.renderers[b].2.picture())?;
+            self.shared.tell(Event::Compared(view, (found.rmse, found.psnr, found.flip)));
+        }
         Ok(())
     }
 
@@ -289,6 +301,14 @@ impl Artist {
         self.shared.tell(Event::Saved(path));
         Ok(())
     }
+}
+
+/// RMSE, PSNR (dB, none if equal) and mean FLIP of two pictures.
+pub(in super::super) type Errors = (f64, Option<f64>, f64);
+
+fn compared(a: &Picture, b: &Picture) -> Result<Comparison> {
+    let side = |picture| compare::Side { picture, planes: None };
+    compare::compare(side(a), side(b), &Set::All)
 }
 
 /// What there is to do.
@@ -436,7 +456,7 @@ fn heat_map(found: &Comparison, [width, height]: [u32; 2]) -> ColorImage {
 }
 
 /// A colour for 0 to 1.
-pub(super) fn heat(value: f32) -> Color32 {
+pub(in super::super) fn heat(value: f32) -> Color32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255")]
     let [r, g, b] = [0.0, 1.0, 2.0]
         .map(|from: f32| ((3.0 * value.clamp(0.0, 1.0) - from).clamp(0.0, 1.0) * 255.0) as u8);

@@ -15,8 +15,9 @@ use std::time::{Duration, Instant};
 use eframe::egui::ColorImage;
 use glam::{DVec3, Vec3};
 
+pub(super) use draw::{Errors, heat};
 pub(super) use load::{LoadRequest, What};
-pub(super) use probe::{Probe, Probed, SeenPath, Thing};
+pub(super) use probe::{Probe, Probed, SeenPath, Thing, class_colors};
 
 use crate::camera::eye::ImageSize;
 use crate::frame::FrameReport;
@@ -102,8 +103,10 @@ pub(super) struct Shot {
     pub(super) map: Option<ColorImage>,
     /// Straight lines on the caustic surface, scene space.
     pub(super) caustic: Vec<[Vec3; 2]>,
-    /// RMSE, PSNR (dB, none if equal) and mean FLIP of the two sides.
-    pub(super) errors: Option<(f64, Option<f64>, f64)>,
+    /// Of the two sides, where they were needed for the map.
+    pub(super) errors: Option<Errors>,
+    /// What the brightest colour of the map stands for, where that is not always the same.
+    pub(super) most: Option<f32>,
     /// Of the scene's last load, everything is there.
     pub(super) complete: bool,
     /// What all of it took.
@@ -144,6 +147,8 @@ pub(super) enum Event {
     /// For people: what failed.
     Failed(String),
     Shot(Box<Shot>),
+    /// How far the two sides of a view are apart: comes after its picture.
+    Compared(Arc<View>, Errors),
     /// A moving picture was given up after so many milliseconds.
     GivenUp(f64),
     Probed(Box<Probed>),

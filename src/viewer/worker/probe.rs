@@ -7,6 +7,7 @@ use super::View;
 use super::{Side, draw::heat};
 use crate::analysis::multiplicity::{MirrorCameras, class_color};
 use crate::analysis::{CameraTrace, trace_camera, triangle_costs};
+use crate::camera::three_ray::multiplicity::Class;
 use crate::camera::{Eye, RayScale};
 use crate::context::Context;
 use crate::error::Result;
@@ -214,6 +215,19 @@ pub(super) fn classes(
     ColorImage::new(size, visibility.mirror_ids.iter().map(color).collect())
 }
 
+/// What each colour of [`classes`] means.
+pub(crate) fn class_colors() -> [(Color32, &'static str); 3] {
+    let color = |class| {
+        let [r, g, b] = class_color(Some(class)).map(linear_to_srgb8);
+        Color32::from_rgb(r, g, b)
+    };
+    [
+        (color(Class::Divergent), "rays run only apart"),
+        (color(Class::ConvergentThenDivergent), "together, then apart"),
+        (color(Class::Mixed), "cross: several images"),
+    ]
+}
+
 /// Straight lines on the caustic surface of all mirrors, scene space.
 pub(super) fn caustic(scene: &PreparedScene, eye: &Eye, side: &Side) -> Vec<[Vec3; 2]> {
     let surface = MirrorCameras::new(scene, eye.position, scale_of(side)).caustic();
@@ -221,13 +235,13 @@ pub(super) fn caustic(scene: &PreparedScene, eye: &Eye, side: &Side) -> Vec<[Vec
 }
 
 /// The mirrors coloured by the projections that each of their triangles takes in a frame, a pixel that it covers:
-/// black for none, white for as many as the most costly hundredth. `None` for methods without cameras.
+/// black for none, white for as many as the most costly hundredth, which comes with it. `None` for methods without cameras.
 pub(super) fn costs(
     scene: &PreparedScene,
     eye: &Eye,
     visibility: &Visibility,
     side: &Side,
-) -> Result<Option<ColorImage>> {
+) -> Result<Option<(ColorImage, f32)>> {
     if side.method != "c3rc" {
         return Ok(None);
     }
@@ -245,5 +259,6 @@ pub(super) fn costs(
         id => heat((share(id as usize) / most).sqrt()),
     };
     let size = [visibility.size.width as usize, visibility.size.height as usize];
-    Ok(Some(ColorImage::new(size, visibility.mirror_ids.iter().map(color).collect())))
+    let map = ColorImage::new(size, visibility.mirror_ids.iter().map(color).collect());
+    Ok(Some((map, most)))
 }

@@ -113,10 +113,7 @@ impl Projection<'_> {
         hits: &mut Hits,
     ) -> u64 {
         let mut valid = 0;
-        let offset = match self.pass.shape {
-            SplatShape::Ellipse | SplatShape::Square1 => BORDER as f32,
-            SplatShape::Square2 => BORDER as f32 - 0.5,
-        };
+        let offset = self.offset();
         let zero = V::broadcast(simd, 0.0);
         // An ellipse may reach the tile from outside.
         let beyond = match self.pass.shape {
@@ -376,6 +373,28 @@ impl Projection<'_> {
         let x = image.linear(self.camera.screen[0]) * inverse + offset;
         let y = image.linear(self.camera.screen[1]) * inverse + offset;
         [x, y, w]
+    }
+
+    /// Whether the image lies in the camera's triangle, or in its cell's rectangle: the paper's valid ones. One by one, as
+    /// vectors of them are counted.
+    pub(crate) fn is_valid(&self, image: &Image<f32>) -> bool {
+        if self.patch.own.is_none() {
+            return image.within([EDGE_TOLERANCE; 3]);
+        }
+        let offset = self.offset();
+        let [x, y, w] = self.place(image, offset);
+        let (right, bottom) = (self.patch.rect.width() as f32, self.patch.rect.height() as f32);
+        let inside =
+            0.0 <= x - offset && 0.0 <= y - offset && x < right + offset && y < bottom + offset;
+        inside && w > 0.0
+    }
+
+    /// From the picture to the tile, which has a border.
+    fn offset(&self) -> f32 {
+        match self.pass.shape {
+            SplatShape::Ellipse | SplatShape::Square1 => BORDER as f32,
+            SplatShape::Square2 => BORDER as f32 - 0.5,
+        }
     }
 
     /// The direction d(w) of the ray in scene space.
