@@ -133,14 +133,12 @@ impl Replay<'_> {
             if !front {
                 continue;
             }
-            if patch.own.is_none() {
-                images += u32::from(work.is_valid(image));
-                continue;
+            if patch.own.is_some() {
+                if !image.within(camera.guard) || pass.first_root_only && taken {
+                    continue;
+                }
+                taken = true;
             }
-            if !image.within(camera.guard) || pass.first_root_only && taken {
-                continue;
-            }
-            taken = true;
             images += u32::from(work.is_valid(image));
         }
         images
