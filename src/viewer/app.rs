@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use eframe::egui::{self, TextureHandle, TextureOptions};
 use glam::DVec3;
 
+use super::blit::Blit;
 use super::dialog::Kind;
 use super::gizmo::Handles;
 use super::placing::Moves;
@@ -55,9 +56,18 @@ pub(super) enum Chosen {
     NoDialog(Kind),
 }
 
+/// A side's picture.
+pub(super) enum OnScreen {
+    /// Pixel by pixel.
+    Whole(Blit),
+    /// Stretched: it was made smaller, to keep up with what moves.
+    Scaled(TextureHandle),
+}
+
 /// What was drawn last, as the window has it.
 pub(super) struct Display {
-    pub(super) textures: Vec<TextureHandle>,
+    /// One for each side.
+    pub(super) pictures: Vec<OnScreen>,
     pub(super) map: Option<TextureHandle>,
     pub(super) view: Arc<View>,
     pub(super) reports: Vec<FrameReport>,
@@ -125,6 +135,10 @@ pub(super) struct Viewer {
     pub(super) steady: bool,
     /// Pictures that were taken over from the worker.
     pub(super) shots: u64,
+    /// Longest side of pictures that the window can show as [`Blit`]s, px: 0 where it cannot.
+    pub(super) blits: u32,
+    /// What is behind the panels has their colour.
+    pub(super) is_cleared: bool,
 }
 
 impl Viewer {
@@ -180,6 +194,8 @@ impl Viewer {
             moving_ms: 0.0,
             steady: false,
             shots: 0,
+            blits: 0,
+            is_cleared: false,
         }
     }
 
@@ -356,24 +372,28 @@ impl Viewer {
                 self.history.pop_front();
             }
         }
-        let mut textures = match self.display.take() {
-            Some(display) => display.textures,
-            None => Vec::new(),
-        };
-        textures.truncate(shot.pictures.len());
-        for (i, picture) in shot.pictures.into_iter().enumerate() {
-            match textures.get_mut(i) {
-                Some(texture) => texture.set(picture, TextureOptions::LINEAR),
-                None => textures.push(context.load_texture(
-                    format!("side {i}"),
-                    picture,
-                    TextureOptions::LINEAR,
-                )),
+        let side = shot.view.size.width.max(shot.view.size.height);
+        let is_whole = shot.view.size == self.size && side <= self.blits;
+        let version = self.shots;
+        let mut before = self.display.take().map(|display| display.pictures.into_iter());
+        let show = |(i, picture)| {
+            let before = before.as_mut().and_then(Iterator::next);
+            if is_whole {
+                return OnScreen::Whole(Blit::new(i, version, picture));
             }
-        }
+            let options = TextureOptions::LINEAR;
+            OnScreen::Scaled(match before {
+                Some(OnScreen::Scaled(mut texture)) => {
+                    texture.set(picture, options);
+                    texture
+                }
+                _ => context.load_texture(format!("side {i}"), picture, options),
+            })
+        };
+        let pictures = shot.pictures.into_iter().enumerate().map(show).collect();
         let load = |map| context.load_texture("map", map, TextureOptions::NEAREST);
         self.display = Some(Display {
-            textures,
+            pictures,
             map: shot.map.map(load),
             view: shot.view,
             reports: shot.reports,

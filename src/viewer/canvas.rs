@@ -5,7 +5,7 @@ use std::sync::Arc;
 use eframe::egui::{self, Align2, Color32, PointerButton, Rect, Sense, Stroke, pos2, vec2};
 use glam::{DVec2, DVec3};
 
-use super::app::Viewer;
+use super::app::{OnScreen, Viewer};
 use super::settings::Shown;
 use super::{legend, navigation, overlay};
 use crate::camera::eye::ImageSize;
@@ -58,26 +58,34 @@ fn paint(viewer: &Viewer, ui: &egui::Ui, rect: Rect) {
         return;
     };
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-    let image = |texture: &egui::TextureHandle, part: Rect| {
-        let at = Rect::from_min_max(
+    let at = |part: Rect| {
+        Rect::from_min_max(
             rect.lerp_inside(part.min.to_vec2()),
             rect.lerp_inside(part.max.to_vec2()),
-        );
-        painter.image(texture.id(), at, part, Color32::WHITE);
+        )
     };
-    let over = |map: &Option<egui::TextureHandle>| {
-        if let Some(map) = map {
-            image(map, whole);
+    let image = |picture: &OnScreen, part: Rect| match picture {
+        OnScreen::Whole(blit) => {
+            let clip = painter.clip_rect().intersect(at(part));
+            blit.paint(&painter.with_clip_rect(clip), rect);
+        }
+        OnScreen::Scaled(texture) => {
+            painter.image(texture.id(), at(part), part, Color32::WHITE);
         }
     };
-    match display.textures.as_slice() {
+    let over = || {
+        if let Some(map) = &display.map {
+            painter.image(map.id(), rect, whole, Color32::WHITE);
+        }
+    };
+    match display.pictures.as_slice() {
         [one] => {
             image(one, whole);
-            over(&display.map);
+            over();
         }
         [a, b] => {
             if display.map.is_some() && viewer.settings.shown != Shown::Divider {
-                over(&display.map);
+                over();
             } else {
                 let at = viewer.settings.divider;
                 image(a, Rect::from_min_max(pos2(0.0, 0.0), pos2(at, 1.0)));

@@ -6,6 +6,7 @@
 //! ```
 
 mod app;
+mod blit;
 mod canvas;
 mod command;
 mod dialog;

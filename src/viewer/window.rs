@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 
 use eframe::egui::{self, ColorImage, ScreenshotCallback, ViewportCommand};
 
-use super::Opening;
 use super::app::Viewer;
 use super::measure::{Course, Outcome};
 use super::settings::{Settings, SideSettings};
+use super::{Opening, blit};
 use crate::camera::eye::ImageSize;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -117,9 +117,13 @@ impl Window {
         }
         let frames = opening.is_measurement().then_some(opening.frames.unwrap_or(0));
         cc.egui_ctx.set_zoom_factor(settings.ui_scale);
+        let scale = settings.ui_scale;
+        let mut viewer = Viewer::new(&cc.egui_ctx, opening, settings);
+        viewer.is_cleared = true;
+        viewer.blits = cc.wgpu_render_state.as_ref().map_or(0, blit::install);
         Self {
-            scale: settings.ui_scale,
-            viewer: Viewer::new(&cc.egui_ctx, opening, settings),
+            scale,
+            viewer,
             course: frames.map(|frames| Course::new(frames, opening.started)),
             screenshot: opening.screenshot.clone(),
             closing: false,
@@ -227,6 +231,11 @@ impl eframe::App for Window {
             course.blocked(before.max(start.elapsed().as_secs_f64() * 1e3));
         }
         self.measure(&context);
+    }
+
+    /// The panels' colour, so that they need not be filled.
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        visuals.panel_fill.to_normalized_gamma_f32()
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {

@@ -84,15 +84,20 @@ pub(super) fn keys(viewer: &mut Viewer, context: &egui::Context) {
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut egui::Ui) {
     let width = ui.available_width();
-    egui::Panel::top("bar").show(ui, |ui| {
+    let mut frame = egui::Frame::side_top_panel(ui.style());
+    if viewer.is_cleared {
+        // Painting over it with the same takes time without a graphics card.
+        frame.fill = egui::Color32::TRANSPARENT;
+    }
+    egui::Panel::top("bar").frame(frame).show(ui, |ui| {
         bar(viewer, ui);
     });
     if ui.available_height() > 100.0 {
-        egui::Panel::bottom("status").show(ui, |ui| timing::status(viewer, ui));
+        egui::Panel::bottom("status").frame(frame).show(ui, |ui| timing::status(viewer, ui));
     }
     if viewer.settings.panel && width >= NARROW {
         let panel = egui::Panel::right("side").default_size(300.0).size_range(220.0..=520.0);
-        panel.show(ui, |ui| {
+        panel.frame(frame).show(ui, |ui| {
             // Long lines are scrolled to: the picture keeps its size.
             egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| side(viewer, ui));
         });
