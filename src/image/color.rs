@@ -14,11 +14,13 @@ pub fn srgb_to_linear(encoded: f32) -> f32 {
 
 /// The 8-bit code whose encoded value is nearest; NaN gives 0, values outside 0 to 1 the ends.
 pub fn linear_to_srgb8(linear: f32) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    #[expect(clippy::cast_possible_truncation, reason = "0 to BINS; NaN gives 0")]
-    let code = CODES.first_in_bin[(linear * BINS as f32) as usize];
-    // At most one step lies within a bin: one comparison decides.
-    code + u8::from(linear >= CODES.steps[code as usize])
+    CODES.nearest(linear)
+}
+
+/// [`linear_to_srgb8`] of each channel.
+pub fn linear_to_srgb8_rgb(rgb: [f32; 3]) -> [u8; 3] {
+    let codes = &*CODES;
+    rgb.map(|linear| codes.nearest(linear))
 }
 
 /// Linear light of an 8-bit code.
@@ -31,25 +33,34 @@ const BINS: usize = 4096;
 
 struct Codes {
     /// Code at the lower end of each bin; the last is for 1 itself.
-    first_in_bin: Vec<u8>,
+    first_in_bin: [u8; BINS + 1],
     /// From here on code + 1 is nearer than code; infinite for 255.
     steps: [f32; 256],
     linear: [f32; 256],
+}
+
+impl Codes {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "0 to BINS; NaN gives 0")]
+    fn nearest(&self, linear: f32) -> u8 {
+        let linear = linear.clamp(0.0, 1.0);
+        let code = self.first_in_bin[(linear * BINS as f32) as usize];
+        // At most one step lies within a bin: one comparison decides.
+        code + u8::from(linear >= self.steps[code as usize])
+    }
 }
 
 static CODES: LazyLock<Codes> = LazyLock::new(|| {
     let steps: [f32; 256] = std::array::from_fn(|code| {
         if code == 255 { f32::INFINITY } else { decode((code as f64 + 0.5) / 255.0) }
     });
-    let mut code = 0;
-    let first_in_bin = (0..=BINS)
-        .map(|bin| {
-            while bin as f32 / BINS as f32 >= steps[code as usize] {
-                code += 1;
-            }
-            code
-        })
-        .collect();
+    let mut code = 0_u8;
+    let first_in_bin = std::array::from_fn(|bin| {
+        while bin as f32 / BINS as f32 >= steps[code as usize] {
+            code += 1;
+        }
+        code
+    });
     Codes { first_in_bin, steps, linear: std::array::from_fn(|code| decode(code as f64 / 255.0)) }
 });
 

@@ -172,6 +172,11 @@ fn the_window_shows_what_render_draws() {
     folder.good("compare c.png r.png --where all --json c.json");
     let flip = folder.json("c.json")["flip"].as_f64().unwrap();
     assert!(flip <= 0.01, "FLIP {flip}");
+    // Its bytes even: nothing filters, tints or shifts a picture on its way to the screen.
+    let [shown, drawn] = ["c.png", "r.png"]
+        .map(|file| image::load_from_memory(&folder.read(file)).unwrap().to_rgb8());
+    let others = shown.pixels().zip(drawn.pixels()).filter(|(a, b)| a != b).count();
+    assert_eq!(others, 0, "of {} pixels", width * height);
     // The comparison can fail: another view.
     folder.good(&format!(
         "render small.toml --surfels 60000 --eye 1,1,3 --size {width}x{height} -o r.png"

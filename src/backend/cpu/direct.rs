@@ -131,9 +131,9 @@ pub fn compose(view: &DirectView, appearance: &impl Appearance, out: &mut [[f32;
     let width = view.visibility.size.width as usize;
     let level = simd_level();
     out.par_chunks_mut((BAND * width).max(1)).enumerate().for_each_init(
-        Vec::new,
-        |spots, (i, band)| {
-            let mut painter = Painter::new(view, appearance, i * BAND * width, band, spots);
+        painter::Scratch::default,
+        |scratch, (i, band)| {
+            let mut painter = Painter::new(view, appearance, i * BAND * width, band, scratch);
             dispatch!(level, simd => painter.paint(simd));
         },
     );

@@ -20,7 +20,7 @@ use crate::frame::Renderer;
 use crate::geometry::Similarity;
 use crate::image::Picture;
 use crate::image::aov::write_aov;
-use crate::image::color::linear_to_srgb8;
+use crate::image::color::{linear_to_srgb8, linear_to_srgb8_rgb};
 use crate::image::compare::{self, Comparison, Set};
 use crate::image::io::write_picture;
 use crate::methods::{Method, method};
@@ -432,7 +432,7 @@ fn backend(side: &Side) -> Result<Box<dyn Backend>> {
 /// As the display wants it.
 pub(super) fn displayed(picture: &Picture) -> ColorImage {
     let color = |rgb: &[f32; 3]| {
-        let [r, g, b] = rgb.map(linear_to_srgb8);
+        let [r, g, b] = linear_to_srgb8_rgb(*rgb);
         Color32::from_rgb(r, g, b)
     };
     let pixels = picture.rgb.par_iter().with_min_len(4096).map(color).collect();

@@ -83,9 +83,21 @@ pub(super) struct Painter<'a, A> {
     /// The surface met last, and its ids: neighbouring samples mostly show the same.
     surface: (Range<u32>, Option<usize>),
     sky: SkySpots,
-    /// What is seen of each object.
-    spots: &'a mut Vec<Vec<Spot>>,
+    scratch: &'a mut Scratch,
 }
+
+/// Memory that the bands of a thread share.
+#[derive(Default)]
+pub(super) struct Scratch {
+    /// What is seen of each object.
+    spots: Vec<Vec<Spot>>,
+    /// The triangles of an object that were met last, each in the place that its index gives it: the next row mostly shows
+    /// the same ones.
+    met: Vec<Option<Met>>,
+}
+
+/// A power of two.
+const MET: usize = 256;
 
 impl<'a, A: Appearance> Painter<'a, A> {
     /// Of the rows from the pixel `first` on, which become black.
@@ -94,12 +106,12 @@ impl<'a, A: Appearance> Painter<'a, A> {
         appearance: &'a A,
         first: usize,
         band: &'a mut [[f32; 3]],
-        spots: &'a mut Vec<Vec<Spot>>,
+        scratch: &'a mut Scratch,
     ) -> Self {
         band.fill([0.0; 3]);
-        spots.resize_with(view.objects.len(), Vec::new);
+        scratch.spots.resize_with(view.objects.len(), Vec::new);
         let sky = SkySpots::default();
-        Self { view, appearance, first, band, surface: (0..0, None), sky, spots }
+        Self { view, appearance, first, band, surface: (0..0, None), sky, scratch }
     }
 
     /// Paints the rows, which are black.
@@ -123,7 +135,7 @@ impl<'a, A: Appearance> Painter<'a, A> {
             }
         }
         self.paint_sky(simd);
-        for object in 0..self.spots.len() {
+        for object in 0..self.scratch.spots.len() {
             self.paint_object(simd, object);
         }
     }
@@ -241,7 +253,7 @@ impl<'a, A: Appearance> Painter<'a, A> {
         let Some(surface) = surface else { return };
         let visibility = self.view.visibility;
         let first = visibility.ids(surface).start;
-        self.spots[surface - visibility.mirrors()].push(Spot {
+        self.scratch.spots[surface - visibility.mirrors()].push(Spot {
             triangle: id - first,
             pixel: pixels.start as u32,
             pixels: pixels.len() as u32,
@@ -300,10 +312,13 @@ impl<'a, A: Appearance> Painter<'a, A> {
     /// Adds all that is seen of an object.
     #[inline(always)]
     fn paint_object<S: Simd>(&mut self, simd: S, object: usize) {
-        let mut list = std::mem::take(&mut self.spots[object]);
+        let list = std::mem::take(&mut self.scratch.spots[object]);
         if list.is_empty() {
             return;
         }
+        let mut met = std::mem::take(&mut self.scratch.met);
+        met.clear();
+        met.resize_with(MET, || None);
         let view = self.view;
         let mesh = &view.objects[object];
         let mut spots = Spots::default();
@@ -312,12 +327,12 @@ impl<'a, A: Appearance> Painter<'a, A> {
             rays: RayWeights::new(view.eye, mesh.corners(triangle as usize)),
             values: self.appearance.corner_values(object, triangle as usize),
         };
-        // Neighbours mostly show the same.
-        let mut shown = meet(list[0].triangle);
         for spot in &list {
-            if shown.triangle != spot.triangle {
-                shown = meet(spot.triangle);
+            let place = &mut met[spot.triangle as usize % MET];
+            if place.as_ref().is_none_or(|old| old.triangle != spot.triangle) {
+                *place = None;
             }
+            let shown = place.get_or_insert_with(|| meet(spot.triangle));
             let shares = shown.rays.shares_about(self.middle_px(spot.pixel as usize, ALL));
             let mut ahead = 0;
             while ahead < spot.pixels {
@@ -328,8 +343,9 @@ impl<'a, A: Appearance> Painter<'a, A> {
             }
         }
         self.paint_spots(simd, mesh, object, &mut spots);
-        list.clear();
-        self.spots[object] = list;
+        self.scratch.met = met;
+        self.scratch.spots[object] = list;
+        self.scratch.spots[object].clear();
     }
 
     #[inline(always)]
