@@ -14,10 +14,7 @@ fn cover(s: Splat, again: bool) {
             if owner_of(pixel) != s.owner {
                 continue;
             }
-            let part = part_at(vec2(x + 0.5 - s.middle.x, dy), s.form, s.weight);
-            if part > 0.0 {
-                add(pixel, part, s.range, s.depth, s.surfel);
-            }
+            add(pixel, vec2(x + 0.5 - s.middle.x, dy), s.form, s.weight, s.range, s.depth, s.surfel);
         }
     }
 }

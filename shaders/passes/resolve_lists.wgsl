@@ -24,21 +24,25 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     var first = vec2(NONE);
     var last = vec2(0u);
     var begun = false;
+    // Where the splats of the front lie, times what they cover.
+    var around = vec2(0.0);
     loop {
         // The nearest one behind the last.
         var found = vec2(NONE);
         var part = 0.0;
         var share = 0.0;
+        var own_about = vec2(0.0);
         for (var i = head; i != 0u;) {
             let entry = entries[i];
-            i = entry.x;
-            let key = entry.yw;
+            i = entry.next;
+            let key = vec2(entry.depth, entry.surfel);
             let behind = !begun || last.x < key.x || (last.x == key.x && last.y < key.y);
             if behind && (key.x < found.x || (key.x == found.x && key.y < found.y)) {
                 found = key;
-                let values = unpack2x16float(entry.z);
+                let values = unpack2x16float(entry.part);
                 part = values.x;
                 share = values.y;
+                own_about = unpack2x16float(entry.about);
             }
         }
         if found.x == NONE || full >= WHOLE {
@@ -47,15 +51,20 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         last = found;
         begun = true;
         let depth = bitcast<f32>(found.x);
-        part = min(part, 1.0 - full);
-        if part <= 0.0 {
-            continue;
-        }
         if full <= 0.0 {
             near = depth;
         }
         if near < depth - share * depth && 1.0 < front {
-            front = full;
+            front = closed(full, around);
+            color *= front / full;
+            full = front;
+        }
+        part = min(part, 1.0 - full);
+        if part <= 0.0 {
+            continue;
+        }
+        if 1.0 < front {
+            around += own_about * part;
         }
         full += part;
         if found.y < frame.first_hider {
@@ -64,6 +73,11 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             }
             color += vec4(radiance_of(found.y), 1.0) * part;
         }
+    }
+    if 1.0 < front && 0.0 < full && full < WHOLE {
+        let whole = closed(full, around);
+        color *= whole / full;
+        full = whole;
     }
     colors[pixel] = color;
     layers[pixel] = vec4(full, near, front, 0.0);

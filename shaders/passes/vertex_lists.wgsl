@@ -7,8 +7,6 @@ fn cover(in: Corner) {
     if owner_of(pixel) != in.ids.y {
         return;
     }
-    let part = part_at(vec2<f32>(at) + 0.5 - in.middle, in.form, in.values.x);
-    if part > 0.0 {
-        add(pixel, part, in.values.y, in.values.z, in.ids.x);
-    }
+    let d = vec2<f32>(at) + 0.5 - in.middle;
+    add(pixel, d, in.form, in.values.x, in.values.y, in.values.z, in.ids.x);
 }

@@ -201,15 +201,19 @@ fn splat_of(job: Job, image: Image) -> Splat {
 /// A splat's kernel in the picture, from the disk that holds its surfel.
 fn kernel(s: ptr<function, Splat>, form: vec3<f32>, own_det: f32) {
     let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
-    let b = form.y;
     let most = 1.0 / max(own_det, least * least * least);
-    let det = own_det + (form.x + form.z) * least + least * least;
-    let a = form.x + least;
-    let c = form.z + least;
+    // Every axis with 1 / r² = e becomes e + l² / (e + l).
+    let trace = form.x + form.z;
+    let added = own_det + trace * least + least * least;
+    let per = least * least / added;
+    let a = form.x + (form.z + least) * per;
+    let c = form.z + (form.x + least) * per;
+    let det = (own_det + trace * least) * (own_det / added)
+        + (trace * trace - own_det + trace * least + least * least) * per;
     let spread = SPREAD * SPREAD / det;
     let pixel = PIXEL * PIXEL;
     let xx = c * spread + pixel;
-    let xy = b * spread;
+    let xy = (form.y - form.y * per) * spread;
     let yy = a * spread + pixel;
     let per_det = 1.0 / (spread * spread * det + spread * (a + c) * pixel + pixel * pixel);
     (*s).form = vec3(yy, xy, xx) * per_det;

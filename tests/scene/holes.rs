@@ -3,7 +3,7 @@
 use catoptric::scene::PreparedScene;
 use glam::DVec3;
 
-use super::{RED, looks, moved, object, prepared, rendered_with, scene, shape};
+use super::{BLUE, RED, looks, moved, object, prepared, rendered_with, scene, shape};
 
 const SIZE: [u32; 2] = [480, 270];
 
@@ -85,4 +85,42 @@ fn nothing_shines_through_at_any_magnification() {
             assert!(outside <= 0.002, "{mirror}, detail {detail}: {outside} outside");
         }
     }
+}
+
+#[test]
+fn few_surfels_hide_what_is_behind_them() {
+    // A red ball before a blue one; surfels are some four pixels apart.
+    let ball = |name: &str, paint, at: DVec3, scale: f64| {
+        let mut ball = object(name, shape("sphere", 4000), moved(at), paint);
+        ball.transform.scale = scale;
+        ball
+    };
+    let objects = vec![
+        ball("near", RED, DVec3::new(0.72, 0.22, 1.23), 0.4),
+        ball("far", BLUE, DVec3::new(2.2, 0.6, 3.6), 2.0),
+    ];
+    let looks = looks(DVec3::new(-0.8, 0.4, 2.2), DVec3::new(0.25, 0.08, 0.8));
+    let scene = scene((shape("sphere", 8000), moved(DVec3::ZERO)), objects, looks);
+    let scene = prepared(&scene, 16_000);
+    let radiance = |id: &str, settings: &[(&str, &str)]| {
+        rendered_with(&scene, id, settings, SIZE[0], SIZE[1]).1.radiance
+    };
+    let truth = radiance("raytrace", &[("spp", "16")]);
+    let ours = radiance("c3rc", &[]);
+    let is_red = |[r, _, b]: [f32; 3]| r > 2.0 * b;
+    let (mut inner, mut wrong) = (0, 0);
+    let (width, height) = (SIZE[0] as usize, SIZE[1] as usize);
+    for y in 2..height - 2 {
+        for x in 2..width - 2 {
+            let mut around =
+                (y - 2..=y + 2).flat_map(|v| (x - 2..=x + 2).map(move |u| v * width + u));
+            if around.all(|k| is_red(truth[k])) {
+                inner += 1;
+                wrong += usize::from(ours[y * width + x][2] > truth[y * width + x][2] + 0.05);
+            }
+        }
+    }
+    println!("{wrong} of {inner} pixels");
+    assert!(inner > 1000, "{inner}");
+    assert!(wrong * 160 <= inner, "what is behind shows in {wrong} of {inner} pixels");
 }

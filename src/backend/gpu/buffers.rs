@@ -92,7 +92,11 @@ impl PictureBuffers {
             },
             entries: match lists {
                 true => Some([
-                    gpu.buffer("splats of all pixels", u64::from(capacity) * 16, own)?,
+                    gpu.buffer(
+                        "splats of all pixels",
+                        u64::from(capacity) * ENTRY_BYTES as u64,
+                        own,
+                    )?,
                     gpu.buffer("the pixels", pixels * 16, own)?,
                     gpu.buffer("the pixels", pixels * 16, own)?,
                 ]),
@@ -125,6 +129,9 @@ impl PictureBuffers {
         }
     }
 }
+
+/// Of `Entry` in `shaders/splat/lists.wgsl`.
+pub(super) const ENTRY_BYTES: usize = 20;
 
 /// Of the target that nothing is written to.
 pub(super) const TARGET: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;

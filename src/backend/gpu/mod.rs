@@ -27,7 +27,7 @@ use std::time::Instant;
 use glam::{Vec3, Vec4};
 
 pub use self::adapters::{Adapter, adapters, features, may_be_there};
-use self::buffers::{Grown, PictureBuffers};
+use self::buffers::{ENTRY_BYTES, Grown, PictureBuffers};
 use self::device::Gpu as Device;
 pub use self::device::Limits;
 use self::look::Composer;
@@ -355,7 +355,7 @@ impl Ready {
                 break;
             }
             // More splats than there was room for: once more, with room.
-            let most = self.gpu.most_elements(size_of::<[u32; 4]>());
+            let most = self.gpu.most_elements(ENTRY_BYTES);
             if needed > most {
                 return Err(Error::input(
                     "--backend gpu",

@@ -91,6 +91,12 @@ fn constants(shape: SplatShape) -> String {
         ("SLOPE", blend::SLOPE),
         ("GAIN", blend::GAIN),
         ("CLOSING", blend::CLOSING),
+        ("AROUND_WITHIN", blend::ALL_AROUND[0]),
+        ("AROUND_BEYOND", blend::ALL_AROUND[1]),
+        ("LARGE_FROM", blend::LARGE[0]),
+        ("LARGE_TO", blend::LARGE[1]),
+        ("GAP_FROM", blend::GAP[0]),
+        ("GAP_TO", blend::GAP[1]),
         ("WHOLE", blend::WHOLE),
     ];
     for (name, value) in numbers {

@@ -45,10 +45,10 @@ fn surfels_in_the_mirror() {
             (project(&eye, at) - centre(i)).abs().max_element()
         });
         let disks = way.splat == Splat::Disk;
-        let far = off.filter(|off| *off > if disks { 6.0 } else { 2.0 }).count();
-        // Along the outline disks reach in that lie beyond it.
+        // The vertices lie so far apart that disks are nearly as large as any may be: eight pixels.
+        let far = off.filter(|off| *off > if disks { 8.0 } else { 2.0 }).count();
         assert!(
-            far <= if disks { covered.len() / 15 } else { 0 },
+            far <= if disks { covered.len() / 500 } else { 0 },
             "{way:?}: {far} of {} pixels show another place",
             covered.len()
         );

@@ -20,11 +20,18 @@ pub(crate) const WHOLE: f32 = 0.999_99;
 pub(crate) const SAME_SURFACE: f32 = 0.02;
 /// See [`SAME_SURFACE`] (untuned).
 pub(crate) const SLOPE: f32 = 0.125;
+/// Where the splats of a surface lie about a pixel, in the mean and in their own size: nearer than the first, all around it, which
+/// is then in a gap between them; farther than the second, it is beyond the surface's edge (untuned).
+pub(crate) const ALL_AROUND: [f32; 2] = [0.35, 0.6];
+/// Splats of half this size, px, may show something that lies within a pixel; from the second on they do not (untuned).
+pub(crate) const LARGE: [f32; 2] = [1.0, 2.0];
+/// Gaps that splats cover less than the first of stay open, those with more than the second do not (untuned).
+pub(crate) const GAP: [f32; 2] = [0.4, 0.5];
 /// Splats drawn before it is asked whether any pixel is still open (untuned).
 const UNTIL_FULL: usize = 32;
 
 /// Values a pixel has, each in a list of its own.
-const PLANES: usize = 8;
+const PLANES: usize = 10;
 /// How full a pixel is.
 const FULL: usize = 3;
 /// The part of that which shows objects; times their radiance in the first three planes.
@@ -35,6 +42,8 @@ const NEAR: usize = 5;
 const FRONT: usize = 6;
 /// Index of the nearest splat that shows an object, as bits: as a number it would be exact below 2^24 only.
 const FIRST: usize = 7;
+/// Where the splats of the front lie about the pixel, in their own size, times what they cover.
+const ABOUT: usize = 8;
 
 /// One patch's pixels, by slot of its tile.
 #[derive(Default)]
@@ -62,11 +71,23 @@ pub(super) struct Blended {
 struct Row {
     /// Columns from the splat's middle to the centre of the first pixel.
     dx: f32,
+    dy: f32,
     slope: f32,
     rest: f32,
     /// Slot of the first pixel, and how many there are.
     at: usize,
     count: f32,
+}
+
+/// How full of its front a pixel counts, where that covers `full` of it: its splats may lie all around, but too far apart.
+#[inline(always)]
+fn closed<R: Real<Scalar = f32>>(full: R, about: [R; 2]) -> R {
+    let (one, zero) = (full.splat(1.0), full.splat(0.0));
+    let far = (about[0] * about[0] + about[1] * about[1]) / (full * full);
+    let [within, beyond] = ALL_AROUND.map(|share| share * share);
+    let around = ((-far + beyond) * (1.0 / (beyond - within))).max(zero).min(one);
+    let some = ((full - GAP[0]) * (1.0 / (GAP[1] - GAP[0]))).max(zero).min(one);
+    full + (one - full) * (around * some)
 }
 
 impl Layers {
@@ -106,6 +127,32 @@ impl Layers {
             last = Some(one);
             let shows = hits.surfel[i] < first_hider;
             self.splat(simd, hits, i, self.colors[i], shows);
+        }
+        self.close(simd);
+    }
+
+    /// Closes the gaps of surfaces that have nothing behind them.
+    #[inline(always)]
+    fn close<S: Simd>(&mut self, simd: S) {
+        let [red, green, blue, full, shown, _, front, _, about_x, about_y] = &mut self.planes;
+        let zero: f32x8<S> = Vector::broadcast(simd, 0.0);
+        let one: f32x8<S> = Vector::broadcast(simd, 1.0);
+        let slots = full.len() / 8 * 8;
+        for at in (0..slots).step_by(8) {
+            let was: f32x8<S> = Vector::load(simd, &full[at..]);
+            let so_far: f32x8<S> = Vector::load(simd, &front[at..]);
+            let open = one.lt(so_far) & zero.lt(was) & was.lt(Real::splat(one, WHOLE));
+            if f32x8::<S>::any(open) {
+                let about: [f32x8<S>; 2] =
+                    [Vector::load(simd, &about_x[at..]), Vector::load(simd, &about_y[at..])];
+                let whole = Real::select(open, closed(was, about), was);
+                Vector::store(whole, &mut full[at..]);
+                let scale = Real::select(open, whole / was, one);
+                for plane in [&mut *red, &mut *green, &mut *blue, &mut *shown] {
+                    let value: f32x8<S> = Vector::load(simd, &plane[at..]);
+                    Vector::store(value * scale, &mut plane[at..]);
+                }
+            }
         }
     }
 
@@ -175,7 +222,8 @@ impl Layers {
                     reason = "see above"
                 )]
                 let at = index * self.stride + column as usize;
-                let row = Row { dx: column + 0.5 - x, slope, rest, at, count: end - column + 1.0 };
+                let row =
+                    Row { dx: column + 0.5 - x, dy, slope, rest, at, count: end - column + 1.0 };
                 self.row(simd, hits, i, a, &row, color, shows);
             }
         }
@@ -194,7 +242,8 @@ impl Layers {
         shows: bool,
     ) {
         const COLUMNS: [f32; 8] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-        let [red, green, blue, full, shown, near, front, first] = &mut self.planes;
+        let [red, green, blue, full, shown, near, front, first, about_x, about_y] =
+            &mut self.planes;
         let depth = hits.depth[i];
         let columns: f32x8<S> = Vector::load(simd, &COLUMNS);
         let zero: f32x8<S> = Vector::broadcast(simd, 0.0);
@@ -202,28 +251,49 @@ impl Layers {
         let weight = f32x8::<S>::broadcast(simd, hits.ellipse[WEIGHT][i] * GAIN);
         let farther = f32x8::<S>::broadcast(simd, depth - hits.ellipse[DEPTH_RANGE][i]);
         let depth = f32x8::<S>::broadcast(simd, depth);
+        let (wide, high) = (hits.ellipse[HALF][i], hits.ellipse[HALF + 1][i]);
+        let (per_wide, per_high) = (1.0 / wide, 1.0 / high);
+        // What is small counts as if it lay beside the pixel: it closes nothing.
+        let small = ((LARGE[1] - wide.min(high)) / (LARGE[1] - LARGE[0])).clamp(0.0, 1.0);
         let mut done = 0.0;
         let mut at = row.at;
         while done < row.count {
             let dx = columns + (row.dx + done);
             let inside = (one - (dx * (dx * a + row.slope) + row.rest)).max(zero);
-            let was: f32x8<S> = Vector::load(simd, &full[at..]);
-            let part = (inside * inside * weight).min(one - was);
-            let mine = Real::lt(columns + done, Real::splat(one, row.count)) & zero.lt(part);
+            let mut was: f32x8<S> = Vector::load(simd, &full[at..]);
+            let kernel = inside * inside * weight;
+            let mut part = kernel.min(one - was);
+            let mut mine = Real::lt(columns + done, Real::splat(one, row.count)) & zero.lt(part);
             if f32x8::<S>::any(mine) {
-                let part = Real::select(mine, part, zero);
+                let mut nearest: f32x8<S> = Vector::load(simd, &near[at..]);
+                let mut so_far: f32x8<S> = Vector::load(simd, &front[at..]);
+                let [ax, ay]: [f32x8<S>; 2] =
+                    [Vector::load(simd, &about_x[at..]), Vector::load(simd, &about_y[at..])];
+                let behind = mine & nearest.lt(farther) & one.lt(so_far) & zero.lt(was);
+                if f32x8::<S>::any(behind) {
+                    let closed = Real::select(behind, closed(was, [ax, ay]), was);
+                    let scale = Real::select(behind, closed / was, one);
+                    for plane in [&mut *red, &mut *green, &mut *blue, &mut *shown] {
+                        let value: f32x8<S> = Vector::load(simd, &plane[at..]);
+                        Vector::store(value * scale, &mut plane[at..]);
+                    }
+                    was = closed;
+                    so_far = Real::select(behind, was, so_far);
+                    Vector::store(so_far, &mut front[at..]);
+                    Vector::store(was, &mut full[at..]);
+                    part = kernel.min(one - was);
+                    mine = mine & zero.lt(part);
+                }
+                part = Real::select(mine, part, zero);
                 Vector::store(was + part, &mut full[at..]);
                 let fresh = mine & was.le(zero);
-                let mut nearest: f32x8<S> = Vector::load(simd, &near[at..]);
                 if f32x8::<S>::any(fresh) {
                     nearest = Real::select(fresh, depth, nearest);
                     Vector::store(nearest, &mut near[at..]);
                 }
-                let so_far: f32x8<S> = Vector::load(simd, &front[at..]);
-                let behind = mine & nearest.lt(farther) & one.lt(so_far);
-                if f32x8::<S>::any(behind) {
-                    Vector::store(Real::select(behind, was, so_far), &mut front[at..]);
-                }
+                let of_front = Real::select(one.lt(so_far), part, zero);
+                Vector::store(ax + of_front * (dx * per_wide + small), &mut about_x[at..]);
+                Vector::store(ay + of_front * (row.dy * per_high), &mut about_y[at..]);
                 if shows {
                     let showed: f32x8<S> = Vector::load(simd, &shown[at..]);
                     let unseen = mine & showed.le(zero);
@@ -424,6 +494,8 @@ mod tests {
         set(FULL, front + behind);
         set(SHOWN, front + behind);
         set(FRONT, if behind > 0.0 { front } else { 2.0 });
+        // Its splats lie to the left.
+        set(ABOUT, front);
         layers
     }
 
@@ -437,6 +509,35 @@ mod tests {
         assert!(is(layers.at(SLOT), 0.6, 0.0, 0.0, 0.6));
         // What is nearly open stays so.
         assert!(is(gap(0.1, 0.0).at(SLOT), 0.1, 0.0, 0.0, 0.1));
+    }
+
+    #[test]
+    fn a_gap_with_splats_all_around_is_closed_and_what_lies_beyond_an_edge_is_not() {
+        // Three about the middle of a pixel, half of it in all; something else behind.
+        let (radius, away) = (4.0f32, 1.5f32);
+        let kernel = (1.0 - (away / radius).powi(2)).powi(2);
+        let part = |weight: f32| weight / (GAIN * kernel);
+        let around = |weight: f32, angles: [f32; 3], radius: f32| {
+            angles.map(|angle: f32| {
+                let (sin, cos) = angle.to_radians().sin_cos();
+                [2.5 + away * cos, 2.5 + away * sin, radius, part(weight), 1.0]
+            })
+        };
+        let back = [2.5, 2.5, 9.0, 9.0, 3.0];
+        let colors = [Vec3::X, Vec3::X, Vec3::X, Vec3::Y];
+        let shown = |list: &[[f32; 5]]| draw(list, &colors, 9).at(SLOT).unwrap().value;
+        let [a, b, c] = around(0.18, [0.0, 120.0, 240.0], radius);
+        assert!(shown(&[a, b, c, back]).abs_diff_eq(Vec4::new(1.0, 0.0, 0.0, 1.0), 1e-5));
+        assert!(shown(&[a, b, c]).abs_diff_eq(Vec4::new(1.0, 0.0, 0.0, 1.0), 1e-5));
+        // On one side, four fifths of their size away.
+        let [a, b, c] = around(0.18, [0.0, 20.0, -20.0], away / 0.8);
+        let found = shown(&[a, b, c, back]);
+        assert!(found.x < 0.5 && found.y > 0.5, "{found}");
+        // Too little, or by what is small.
+        let [a, b, c] = around(0.1, [0.0, 120.0, 240.0], radius);
+        assert!((shown(&[a, b, c, back]) - Vec4::new(0.3, 0.7, 0.0, 1.0)).length() < 1e-5);
+        let small = [2.5, 2.5, 0.9, 0.6 / GAIN, 1.0];
+        assert!(is(draw(&[small, back], &[Vec3::X, Vec3::Y], 9).at(SLOT), 0.6, 0.4, 0.0, 1.0));
     }
 
     #[test]

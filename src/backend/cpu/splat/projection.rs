@@ -36,8 +36,13 @@ impl<R: Real<Scalar = f32>> Kernel<R> {
         let least = 1.0 / (LARGEST_ELLIPSE * LARGEST_ELLIPSE);
         // Near a caustic it is larger than what is drawn of it: that is to count for all of it.
         let most = a.splat(1.0) / det.max(a.splat(least * least * least));
-        let det = det + (a + c) * least + least * least;
-        let (a, c) = (a + least, c + least);
+        // Every axis with 1 / r² = e becomes e + l² / (e + l): what is well below the largest keeps its size.
+        let (own, trace) = (det, a + c);
+        let added = own + trace * least + least * least;
+        let (kept, per) = (own / added, own.splat(least * least) / added);
+        let (a, b, c) = (a + (c + least) * per, b - b * per, c + (a + least) * per);
+        let det = (own + trace * least) * kept
+            + (trace * trace - own + trace * least + least * least) * per;
         // The disk's ellipse and the pixel's add as variances do.
         let spread = a.splat(SPREAD * SPREAD) / det;
         let pixel = PIXEL * PIXEL;

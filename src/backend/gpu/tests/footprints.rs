@@ -177,8 +177,13 @@ fn by_hand<T: Scalar + Real<Scalar = T, Mask = bool>>(
     let turned = cross(right, down);
     let own = dot(turned, turned) * (size * size);
     let area = T::from_f64(1.0) / own.max(limit * limit * limit);
-    let own = own + (a + e) * limit + limit * limit;
-    let (a, e) = (a + limit, e + limit);
+    // Every axis with 1 / r² = v becomes v + l² / (v + l): the form plus l² times the inverse of itself plus l.
+    let trace = a + e;
+    let added = own + trace * limit + limit * limit;
+    let per = limit * limit / added;
+    let (a, b, e) = (a + (e + limit) * per, b - b * per, e + (a + limit) * per);
+    let own = (own + trace * limit) * (own / added)
+        + (trace * trace - own + trace * limit + limit * limit) * per;
     let spread = T::from_f64(f64::from(constants::SPREAD).powi(2)) / own;
     let pixel = T::from_f64(f64::from(constants::PIXEL).powi(2));
     let (xx, xy, yy) = (e * spread + pixel, b * spread, a * spread + pixel);
