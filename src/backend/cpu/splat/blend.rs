@@ -30,7 +30,8 @@ pub(crate) const GAP: [f32; 2] = [0.4, 0.5];
 /// Splats drawn before it is asked whether any pixel is still open (untuned).
 const UNTIL_FULL: usize = 32;
 
-/// Values a pixel has, each in a list of its own.
+/// Values a pixel has, each in a list of its own; the last two: where the splats of the front lie about the pixel, in their own
+/// size, times what they cover.
 const PLANES: usize = 10;
 /// How full a pixel is.
 const FULL: usize = 3;
@@ -42,8 +43,6 @@ const NEAR: usize = 5;
 const FRONT: usize = 6;
 /// Index of the nearest splat that shows an object, as bits: as a number it would be exact below 2^24 only.
 const FIRST: usize = 7;
-/// Where the splats of the front lie about the pixel, in their own size, times what they cover.
-const ABOUT: usize = 8;
 
 /// One patch's pixels, by slot of its tile.
 #[derive(Default)]
@@ -282,7 +281,7 @@ impl Layers {
                     Vector::store(so_far, &mut front[at..]);
                     Vector::store(was, &mut full[at..]);
                     part = kernel.min(one - was);
-                    mine = mine & zero.lt(part);
+                    mine &= zero.lt(part);
                 }
                 part = Real::select(mine, part, zero);
                 Vector::store(was + part, &mut full[at..]);
@@ -495,7 +494,7 @@ mod tests {
         set(SHOWN, front + behind);
         set(FRONT, if behind > 0.0 { front } else { 2.0 });
         // Its splats lie to the left.
-        set(ABOUT, front);
+        set(PLANES - 2, front);
         layers
     }
 
