@@ -3,6 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::wide::{WIDTH, child_leaves};
 use super::{KdTreeLimits, Node, NormalCone};
 use crate::geometry::{Aabb, Surfels};
 
@@ -44,9 +45,10 @@ fn subtree(items: &mut [Item], first: u32, leaf_points: u32, smallest: f32) -> V
         spread(items);
         return vec![node];
     }
-    // A multiple of the leaf's size goes left, so that all leaves but one are full.
-    let leaves = count.div_ceil(leaf_points);
-    let left_count = (leaves / 2 * leaf_points).max(1);
+    // Whole blocks go left, so that all leaves but one are full, and all wide nodes above leaves. Higher up that would cost
+    // thin slabs, which is what one of the larger blocks leaves over.
+    let block = leaf_points * child_leaves(count.div_ceil(leaf_points)).min(WIDTH);
+    let left_count = count.div_ceil(block) / 2 * block;
     let axis = bounds.extent().max_position();
     let key = |i: &Item| i.position[axis];
     // The surfel's index breaks ties, so that the tree does not depend on the selection's inner order.

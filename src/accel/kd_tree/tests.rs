@@ -56,6 +56,18 @@ fn holds_its_invariants_at_every_size() {
 }
 
 #[test]
+fn all_wide_nodes_above_leaves_but_one_are_full() {
+    // By medians alone nearly all would hold four or five of the last two.
+    for n in [8 * 64, 8 * 4099 - 3, 8 * 5000] {
+        let limits = KdTreeLimits { leaf_points: 8, leaf_size: 0.0 };
+        let tree = KdTree::build(&mut cloud(n, 13), limits);
+        let last: Vec<&WideNode> = tree.wide().iter().filter(|w| w.child == [0; 8]).collect();
+        assert_eq!(last.len(), n.div_ceil(64));
+        assert!(last.iter().filter(|w| w.used != 0xff).count() <= 1, "{n}");
+    }
+}
+
+#[test]
 fn validation_sees_a_broken_tree() {
     let limits = KdTreeLimits::default();
     let mut surfels = cloud(500, 3);

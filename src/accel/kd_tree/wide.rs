@@ -118,7 +118,7 @@ fn leaf_counts(nodes: &[Node]) -> Vec<u32> {
 }
 
 /// The most leaves that a child of a node with so many should hold: a power of eight.
-fn child_leaves(leaves: u32) -> u32 {
+pub(super) fn child_leaves(leaves: u32) -> u32 {
     let mut most = 1;
     while most < leaves.div_ceil(WIDTH) {
         most *= WIDTH;
