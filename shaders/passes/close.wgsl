@@ -39,31 +39,41 @@ fn close(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     }
     let at = vec2(i32(pixel % frame.size.x), i32(pixel / frame.size.x));
     let layer = layers[pixel].xyz;
-    var sides = array<Beside, 4>(
-        beside(at - vec2(1, 0), owner), beside(at + vec2(1, 0), owner),
-        beside(at - vec2(0, 1), owner), beside(at + vec2(0, 1), owner),
-    );
+    // Gaps a pixel wide, then two, in the row and the column.
     let full = layer.x;
-    if CLOSING <= full && full < WHOLE {
-        let covered = max(min(sides[0].layer.x, sides[1].layer.x), min(sides[2].layer.x, sides[3].layer.x));
-        own *= max(covered, full) / full;
-    }
     let front = layer.z;
-    if CLOSING <= front && front < WHOLE {
-        var closed = front;
-        var between = own;
-        for (var i = 0; i < 4; i += 2) {
-            let a = sides[i];
-            let b = sides[i + 1];
-            let covered = min(min(a.layer.x, a.layer.z), min(b.layer.x, b.layer.z));
-            let off = abs(0.5 * (a.layer.y + b.layer.y) - layer.y);
-            let alike = off <= SAME_SURFACE_SHARE * layer.y + SLOPE * abs(a.layer.y - b.layer.y);
-            if covered > closed && alike {
-                closed = covered;
-                between = (a.color + b.color) * 0.5;
-            }
+    var covered = full;
+    var closed = front;
+    var mean = own;
+    for (var i = 0; i < 6; i += 1) {
+        let step = select(vec2(0, 1), vec2(1, 0), i < 3);
+        let kind = i % 3;
+        let a = beside(at - step * select(1, 2, kind == 2), owner);
+        let b = beside(at + step * select(1, 2, kind == 1), owner);
+        // The gap's other pixel.
+        var between = Beside(vec3(1.0, 0.0, 2.0), vec4(0.0));
+        if kind != 0 {
+            between = beside(at + step * select(-1, 1, kind == 1), owner);
         }
-        own = mix(own, between, (closed - front) / (1.0 - front));
+        if kind == 0 || CLOSING_TWO <= min(between.layer.x, full) {
+            covered = max(covered, min(a.layer.x, b.layer.x));
+        }
+        let share = select(select(1.0 / 3.0, 2.0 / 3.0, kind == 2), 0.5, kind == 0);
+        let both = min(min(a.layer.x, a.layer.z), min(b.layer.x, b.layer.z));
+        let off = abs(mix(a.layer.y, b.layer.y, share) - layer.y);
+        let alike = off <= SAME_SURFACE_SHARE * layer.y + SLOPE * abs(a.layer.y - b.layer.y);
+        let of_front = min(between.layer.x, between.layer.z);
+        let narrow = kind == 0 || CLOSING_TWO <= min(of_front, front);
+        if both > closed && alike && narrow {
+            closed = both;
+            mean = mix(a.color, b.color, share);
+        }
+    }
+    if CLOSING <= full && full < WHOLE {
+        own *= covered / full;
+    }
+    if CLOSING <= front && front < WHOLE {
+        own = mix(own, mean, (closed - front) / (1.0 - front));
     }
     reflection[pixel] = own;
 }

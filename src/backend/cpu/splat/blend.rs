@@ -13,6 +13,8 @@ use crate::geometry::lanes::{Real, Vector};
 pub(crate) const GAIN: f32 = 1.3;
 /// From this coverage on a gap between covered pixels is closed (untuned).
 pub(crate) const CLOSING: f32 = 0.4;
+/// The same of gaps two pixels wide, for both: what is less may be an edge (untuned).
+pub(crate) const CLOSING_TWO: f32 = 0.75;
 /// Of a pixel that is covered, but for rounding.
 pub(crate) const WHOLE: f32 = 0.999_99;
 /// Three pixels in a row show one surface if the depth in the middle is that between the others but for this share of it, and
@@ -76,6 +78,16 @@ struct Row {
     /// Slot of the first pixel, and how many there are.
     at: usize,
     count: f32,
+}
+
+/// Two slots on both sides of a gap.
+struct Across {
+    a: usize,
+    b: usize,
+    /// The gap's other slot, if it is two wide.
+    between: Option<usize>,
+    /// How far from `a` to `b` the gap's own slot lies.
+    share: f32,
 }
 
 /// How full of its front a pixel counts, where that covers `full` of it: its splats may lie all around, but too far apart.
@@ -316,6 +328,27 @@ impl Layers {
         }
     }
 
+    /// The pairs of slots that a gap at `slot` may lie between: a pixel wide, or two, in its row or its column.
+    fn across(&self, slot: usize) -> impl Iterator<Item = Across> {
+        // The first slot is the border's: not the patch's, as all beyond.
+        let slots = self.planes[FULL].len() - 8;
+        let at = move |steps: isize, step: usize| {
+            let at = slot.checked_add_signed(steps * step.cast_signed());
+            at.filter(|at| *at < slots).unwrap_or(0)
+        };
+        [1, self.stride].into_iter().flat_map(move |step| {
+            let (third, two) = (1.0 / 3.0, 2.0 / 3.0);
+            [(-1, 1, None, 0.5), (-1, 2, Some(1), third), (-2, 1, Some(-1), two)].map(
+                |(a, b, between, share)| Across {
+                    a: at(a, step),
+                    b: at(b, step),
+                    between: between.map(|c| at(c, step)),
+                    share,
+                },
+            )
+        })
+    }
+
     /// What landed on a slot. Where splats leave a part of the front open between two pixels that show the same
     /// surface, they lie too far apart there: it is closed. Edges stay.
     pub(super) fn at(&self, slot: usize) -> Option<Blended> {
@@ -326,29 +359,34 @@ impl Layers {
         if own.w == 0.0 {
             return None;
         }
-        let beside = [(slot - 1, slot + 1), (slot - self.stride, slot + self.stride)];
         let full = get(FULL, slot);
         if (CLOSING..WHOLE).contains(&full) {
-            let covered = beside.map(|(a, b)| get(FULL, a).min(get(FULL, b)));
-            own *= covered[0].max(covered[1]).max(full) / full;
+            let mut closed = full;
+            for Across { a, b, between, .. } in self.across(slot) {
+                if between.is_none_or(|c| get(FULL, c).min(full) >= CLOSING_TWO) {
+                    closed = closed.max(get(FULL, a).min(get(FULL, b)));
+                }
+            }
+            own *= closed / full;
         }
         let front = get(FRONT, slot);
         if (CLOSING..WHOLE).contains(&front) {
             let near = get(NEAR, slot);
+            let of_front = |slot: usize| get(FRONT, slot).min(get(FULL, slot));
             let mut closed = front;
-            let mut between = own;
-            for (a, b) in beside {
+            let mut mean = own;
+            for Across { a, b, between, share } in self.across(slot) {
                 let depths = [get(NEAR, a), get(NEAR, b)];
-                let off = (0.5 * (depths[0] + depths[1]) - near).abs();
+                let off = (depths[0] + (depths[1] - depths[0]) * share - near).abs();
                 let alike = off <= SAME_SURFACE * near + SLOPE * (depths[0] - depths[1]).abs();
-                let of_front = |slot: usize| get(FRONT, slot).min(get(FULL, slot));
                 let covered = of_front(a).min(of_front(b));
-                if covered > closed && alike {
+                let narrow = between.is_none_or(|c| of_front(c).min(front) >= CLOSING_TWO);
+                if covered > closed && alike && narrow {
                     closed = covered;
-                    between = (value(a) + value(b)) * 0.5;
+                    mean = value(a).lerp(value(b), share);
                 }
             }
-            own = own.lerp(between, (closed - front) / (1.0 - front));
+            own = own.lerp(mean, (closed - front) / (1.0 - front));
         }
         let first = get(FIRST, slot).to_bits() as usize;
         Some(Blended { value: own, first })
@@ -508,6 +546,29 @@ mod tests {
         assert!(is(layers.at(SLOT), 0.6, 0.0, 0.0, 0.6));
         // What is nearly open stays so.
         assert!(is(gap(0.1, 0.0).at(SLOT), 0.1, 0.0, 0.0, 0.1));
+    }
+
+    #[test]
+    fn gaps_two_pixels_wide_are_closed_if_both_are_nearly_full() {
+        for (own, other, closed) in [(0.8, 0.8, true), (0.8, 0.7, false), (0.7, 0.8, false)] {
+            for behind in [0.0, 1.0 - own] {
+                // Its neighbours in the row and the column, too: no pair of next ones is full.
+                let mut layers = gap(own, behind);
+                for beside in [SLOT - 1, SLOT + 5] {
+                    layers.planes[FULL][beside] = other;
+                    layers.planes[FRONT][beside] = if behind > 0.0 { other } else { 2.0 };
+                }
+                // What lies beyond them shows the same, although the tile ends there.
+                for beyond in [SLOT - 2, SLOT + 10] {
+                    for plane in [0, SHOWN, NEAR] {
+                        layers.planes[plane][beyond] = 1.0;
+                    }
+                }
+                let red = if closed { 1.0 } else { own.max(other) };
+                let found = layers.at(SLOT).unwrap().value;
+                assert!((found.x - red).abs() < 1e-5, "{own} {other} {behind}: {found}");
+            }
+        }
     }
 
     #[test]

@@ -27,7 +27,7 @@ const fn core(splat: &'static str, path: Path, from: &'static str, to: &'static 
 
 use Path::{Compute as C, Vertex as V};
 
-const MUTANTS: [Mutant; 38] = [
+const MUTANTS: [Mutant; 40] = [
     // plan
     mutant("square2", C, "number - batch.x < batch.y", "number - batch.x < batch.y - 1u"),
     mutant("square2", C, "(number - batch.x) * batch.w", "(number - batch.x)"),
@@ -75,7 +75,9 @@ const MUTANTS: [Mutant; 38] = [
     mutant("ellipse", C, "part = min(part, 1.0 - full);", ""),
     mutant("ellipse", C, "found.y < frame.first_hider", "found.y >= 0u"),
     mutant("square2", C, "key.y < frame.first_hider", "key.y >= 0u"),
-    mutant("ellipse", C, "between = (a.color + b.color) * 0.5;", "between = a.color;"),
+    mutant("ellipse", C, "mean = mix(a.color, b.color, share);", "mean = a.color;"),
+    mutant("ellipse", C, "(1.0 - full) * around * some;", "0.0;"),
+    mutant("ellipse", C, "covered = max(covered, min(a.layer.x, b.layer.x));", ""),
 ];
 
 #[test]
