@@ -22,6 +22,38 @@ fn beside(at: vec2<i32>, owner: u32) -> Beside {
     return Beside(layers[pixel].xyz, colors[pixel]);
 }
 
+/// The mean of what lies around a pixel, if that is one surface with what landed first there; else nothing.
+fn surrounding(at: vec2<i32>, near: f32, owner: u32) -> vec4<f32> {
+    var sum = vec4(0.0);
+    var own = 0.0;
+    for (var i = 0; i < 2; i += 1) {
+        let step = select(vec2(0, 1), vec2(1, 0), i == 0);
+        var depths = vec2(near);
+        var count = 0.0;
+        for (var k = 0; k < 2; k += 1) {
+            let n = beside(at + step * (2 * k - 1), owner);
+            if min(n.layer.x, n.layer.z) < SURROUNDED {
+                return vec4(0.0);
+            }
+            if n.layer.y > 0.0 {
+                if n.color.w < SURROUNDED {
+                    return vec4(0.0);
+                }
+                depths[k] = n.layer.y;
+                count += 1.0;
+                sum += n.color;
+            }
+        }
+        let slope = select(0.0, abs(depths.x - depths.y), count == 2.0);
+        let off = abs(0.5 * (depths.x + depths.y) - near);
+        if off > SAME_SURFACE_SHARE * near + SLOPE * slope {
+            return vec4(0.0);
+        }
+        own += count;
+    }
+    return select(vec4(0.0), sum / max(own, 1.0), own >= 3.0);
+}
+
 @compute @workgroup_size(64)
 fn close(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let pixel = (group.y * GROUPS + group.x) * 64u + lane;
@@ -42,6 +74,12 @@ fn close(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     // Gaps a pixel wide, then two, in the row and the column.
     let full = layer.x;
     let front = layer.z;
+    if min(full, front) < CLOSING {
+        let around = surrounding(at, layer.y, owner);
+        if around.w > 0.0 {
+            own = around;
+        }
+    }
     var covered = full;
     var closed = front;
     var mean = own;

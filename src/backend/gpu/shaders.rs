@@ -92,6 +92,7 @@ fn constants(shape: SplatShape) -> String {
         ("GAIN", blend::GAIN),
         ("CLOSING", blend::CLOSING),
         ("CLOSING_TWO", blend::CLOSING_TWO),
+        ("SURROUNDED", blend::SURROUNDED),
         ("AROUND_WITHIN", blend::ALL_AROUND[0]),
         ("AROUND_BEYOND", blend::ALL_AROUND[1]),
         ("LARGE_FROM", blend::LARGE[0]),

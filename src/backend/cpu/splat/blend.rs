@@ -15,6 +15,8 @@ pub(crate) const GAIN: f32 = 1.3;
 pub(crate) const CLOSING: f32 = 0.4;
 /// The same of gaps two pixels wide, for both: what is less may be an edge (untuned).
 pub(crate) const CLOSING_TWO: f32 = 0.75;
+/// Where less of a surface landed between four pixels that show so much of it, they say what is there (untuned).
+pub(crate) const SURROUNDED: f32 = 0.9;
 /// Of a pixel that is covered, but for rounding.
 pub(crate) const WHOLE: f32 = 0.999_99;
 /// Three pixels in a row show one surface if the depth in the middle is that between the others but for this share of it, and
@@ -349,6 +351,37 @@ impl Layers {
         })
     }
 
+    /// The mean of what lies around a slot, if that is one surface with what landed first there: a gap larger than a pixel between
+    /// splats. One of the four may be another patch's.
+    fn surrounding(&self, slot: usize) -> Option<Vec4> {
+        let get = |plane: usize, slot: usize| self.planes[plane][slot];
+        let near = get(NEAR, slot);
+        let (mut sum, mut own) = (Vec4::ZERO, 0.0);
+        for (a, b) in [(slot - 1, slot + 1), (slot - self.stride, slot + self.stride)] {
+            let (mut depths, mut count) = ([near; 2], 0.0);
+            for (n, depth) in [a, b].into_iter().zip(&mut depths) {
+                let value = Vec4::new(get(0, n), get(1, n), get(2, n), get(SHOWN, n));
+                if get(FULL, n).min(get(FRONT, n)) < SURROUNDED {
+                    return None;
+                }
+                if get(NEAR, n) > 0.0 {
+                    if value.w < SURROUNDED {
+                        return None;
+                    }
+                    (*depth, count) = (get(NEAR, n), count + 1.0);
+                    sum += value;
+                }
+            }
+            let slope = if count == 2.0 { (depths[0] - depths[1]).abs() } else { 0.0 };
+            let off = (0.5 * (depths[0] + depths[1]) - near).abs();
+            if off > SAME_SURFACE * near + SLOPE * slope {
+                return None;
+            }
+            own += count;
+        }
+        (own >= 3.0).then(|| sum / own)
+    }
+
     /// What landed on a slot. Where splats leave a part of the front open between two pixels that show the same
     /// surface, they lie too far apart there: it is closed. Edges stay.
     pub(super) fn at(&self, slot: usize) -> Option<Blended> {
@@ -360,6 +393,11 @@ impl Layers {
             return None;
         }
         let full = get(FULL, slot);
+        if full.min(get(FRONT, slot)) < CLOSING
+            && let Some(mean) = self.surrounding(slot)
+        {
+            own = mean;
+        }
         if (CLOSING..WHOLE).contains(&full) {
             let mut closed = full;
             for Across { a, b, between, .. } in self.across(slot) {
@@ -545,7 +583,35 @@ mod tests {
         layers.planes[FULL][SLOT + 5] = 0.0;
         assert!(is(layers.at(SLOT), 0.6, 0.0, 0.0, 0.6));
         // What is nearly open stays so.
-        assert!(is(gap(0.1, 0.0).at(SLOT), 0.1, 0.0, 0.0, 0.1));
+        let mut layers = gap(0.1, 0.0);
+        layers.planes[FULL][SLOT + 5] = 0.8;
+        assert!(is(layers.at(SLOT), 0.1, 0.0, 0.0, 0.1));
+    }
+
+    #[test]
+    fn a_gap_in_the_middle_of_a_surface_shows_what_is_around_it() {
+        for behind in [0.0, 0.9] {
+            assert!(is(gap(0.1, behind).at(SLOT), 1.0, 0.0, 0.0, 1.0));
+            // One neighbour may be another patch's, two not.
+            let foreign = |count: usize| {
+                let mut layers = gap(0.1, behind);
+                for slot in [SLOT + 1, SLOT + 5].into_iter().take(count) {
+                    for plane in [0, SHOWN, NEAR] {
+                        layers.planes[plane][slot] = 0.0;
+                    }
+                }
+                layers.at(SLOT)
+            };
+            assert!(is(foreign(1), 1.0, 0.0, 0.0, 1.0));
+            assert!(is(foreign(2), 0.1, behind, 0.0, 0.1 + behind));
+            // Something small before the surface, or a neighbour that mirrors hide.
+            let mut layers = gap(0.1, behind);
+            layers.planes[NEAR][SLOT] = 0.9;
+            assert!(is(layers.at(SLOT), 0.1, behind, 0.0, 0.1 + behind));
+            let mut layers = gap(0.1, behind);
+            layers.planes[SHOWN][SLOT - 5] = 0.5;
+            assert!(is(layers.at(SLOT), 0.1, behind, 0.0, 0.1 + behind));
+        }
     }
 
     #[test]
