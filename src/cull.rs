@@ -6,6 +6,7 @@ use crate::accel::kd_tree::representatives::{PAIRS, QUADS, REPRESENTATIVES};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::camera::three_ray::{BoxTest, Boxes, ViewVolume};
 use crate::geometry::lanes::{Real, Vector, dot_const, simd_level};
+use crate::plan::kernel::{AGREEING, BETWEEN, LEAST_NODE_FACING};
 use crate::plan::{Batch, BatchSource, CameraInstance, Gaze, Volume};
 use crate::scene::prepared::PreparedScene;
 
@@ -109,13 +110,6 @@ pub(crate) enum Decision {
     Open(Open),
 }
 
-/// Representatives of a level are taken from here on, in shares of the area that they should have at most: each level's
-/// are twice as large as the next one's, so that on average they have that area.
-const BETWEEN: f32 = std::f32::consts::SQRT_2;
-/// Normals within about this cosine of one say how large a node is seen (untuned).
-const AGREEING: f32 = 0.7;
-/// But not smaller than this share (untuned).
-const LEAST_FACING: f32 = 0.25;
 /// A wide level at least halves the surfels, and each leaves at most seven siblings open.
 const STACK: usize = 32 * (CHILDREN - 1) + 1;
 
@@ -244,7 +238,7 @@ impl Walk<'_> {
         // Seen from the side a disk is as much smaller as its surfels' normals say, where they agree.
         let axis = [0, 1, 2].map(|k| V::load(simd, &node.cone_axis[k]));
         let one = V::broadcast(simd, 1.0);
-        let facing = dot_const(axis, self.axis).abs().max(V::broadcast(simd, LEAST_FACING));
+        let facing = dot_const(axis, self.axis).abs().max(V::broadcast(simd, LEAST_NODE_FACING));
         let agree = V::broadcast(simd, AGREEING).lt(V::load(simd, &node.cone_cosine));
         let needed = needed * V::select(agree, facing, one);
         let seen = det.sqrt() * BETWEEN;

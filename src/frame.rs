@@ -242,7 +242,8 @@ impl Renderer {
         cx: &Context,
     ) -> Result<(FrameReport, ExecuteReport)> {
         let start = Instant::now();
-        let mut plan = Plan { cx: cx.silent(), ..Plan::default() };
+        let gathers = self.backend.gathers();
+        let mut plan = Plan { cx: cx.silent(), gathers, ..Plan::default() };
         let input = FrameInput { scene, eye, visibility: &self.visibility };
         method.plan(input, made, params, &mut plan)?;
         let planned_ms = milliseconds(start);
@@ -259,7 +260,7 @@ impl Renderer {
             steps: done.steps,
             mirror_pixels: self.visibility.mirror_ids.iter().filter(|&&id| id != NONE_ID).count(),
             covered_pixels: self.reflection.coverage.iter().filter(|&&c| c >= 0.5).count(),
-            cameras_ms: done.cameras.map(|_| plan.times.cameras_ms),
+            cameras_ms: done.cameras_ms.or(done.cameras.map(|_| plan.times.cameras_ms)),
             cull_ms: done.cull_ms,
             project_ms: done.project_ms,
             splat_ms: done.splat_ms,

@@ -1,5 +1,6 @@
 //! A frame as data: passes over named resources, in order. Methods write plans, backends execute them.
 
+pub(crate) mod kernel;
 pub mod search;
 
 use std::sync::Arc;
@@ -196,6 +197,46 @@ pub struct GatherTimes {
     pub rays_ms: f64,
     /// Number of rays.
     pub rays: usize,
+    /// What it did with surfels, where it draws those.
+    pub surfels: Option<GatherCounts>,
+}
+
+/// What a gather pass that draws surfels did.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GatherCounts {
+    /// Beams and clouds walked for them.
+    pub cameras: usize,
+    /// Beams.
+    pub patches: usize,
+    /// Ranges of surfels that were looked at.
+    pub batches: u64,
+    /// Beam–surfel pairs.
+    pub projections: u64,
+    /// Pairs of which something may be seen.
+    pub valid: u64,
+    /// Rays and beams, nanoseconds of all threads together.
+    pub cameras_ns: u64,
+    /// Culling and projection, likewise.
+    pub walk_ns: u64,
+    /// Blending, likewise.
+    pub splat_ns: u64,
+}
+
+impl GatherCounts {
+    /// Both together.
+    #[must_use]
+    pub fn plus(self, o: Self) -> Self {
+        Self {
+            cameras: self.cameras + o.cameras,
+            patches: self.patches + o.patches,
+            batches: self.batches + o.batches,
+            projections: self.projections + o.projections,
+            valid: self.valid + o.valid,
+            cameras_ns: self.cameras_ns + o.cameras_ns,
+            walk_ns: self.walk_ns + o.walk_ns,
+            splat_ns: self.splat_ns + o.splat_ns,
+        }
+    }
 }
 
 /// What is around a mirror, seen from its centre.
@@ -306,6 +347,8 @@ pub struct Plan<'a> {
     pub notes: Vec<String>,
     /// Whoever executes it stops once this is cancelled.
     pub cx: Context,
+    /// Whether gather passes can be executed: a method may draw otherwise where they cannot.
+    pub gathers: bool,
 }
 
 /// What planning took, milliseconds.

@@ -52,6 +52,10 @@ impl Backend for WithSpare {
         self.current().device()
     }
 
+    fn gathers(&self) -> bool {
+        self.current().gathers()
+    }
+
     fn execute(
         &mut self,
         plan: &Plan<'_>,
@@ -99,7 +103,9 @@ pub struct ExecuteReport {
     pub projections: Option<u64>,
     /// Those that have an image, where they are counted.
     pub valid: Option<u64>,
-    /// Culling, milliseconds of all threads together by their number.
+    /// Making cameras, where that was not done while planning: milliseconds of all threads together by their number.
+    pub cameras_ms: Option<f64>,
+    /// Culling, likewise; with projection where they go hand in hand.
     pub cull_ms: Option<f64>,
     /// Projection, likewise.
     pub project_ms: Option<f64>,
@@ -123,6 +129,11 @@ pub trait Backend: Send {
     /// The device that it runs on, and how, where that is not the CPU.
     fn device(&self) -> Option<String> {
         None
+    }
+
+    /// Whether it executes gather passes.
+    fn gathers(&self) -> bool {
+        true
     }
 
     /// Executes `plan`; `out` becomes the reflection of every mirror pixel. With `planes` it also says what was

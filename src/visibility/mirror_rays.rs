@@ -130,14 +130,20 @@ impl RayField {
                 let from = left.trailing_zeros() as usize;
                 let id = self.ids[y * TILE + from];
                 let facet = self.facet(eye, scene, id);
+                let mut to = from;
+                while to < TILE && left >> to & 1 != 0 && self.ids[y * TILE + to] == id {
+                    to += 1;
+                }
+                left &= if to < TILE { u32::MAX << to } else { 0 };
+                let (view, cy) = (self.view, centre(y));
                 let [a, b, c, q] = &mut self.field;
-                let mut x = from;
-                while x < TILE && left >> x & 1 != 0 && self.ids[y * TILE + x] == id {
-                    let ray = reflected(&self.view, &facet, centre(x), centre(y));
-                    let i = y * TILE + x;
-                    (a[i], b[i], c[i], q[i]) = (ray[0], ray[1], ray[2], ray[3]);
-                    left &= !(1 << x);
-                    x += 1;
+                let row = y * TILE + from..y * TILE + to;
+                let rows = a[row.clone()].iter_mut().zip(&mut b[row.clone()]);
+                let rows = rows.zip(&mut c[row.clone()]).zip(&mut q[row]);
+                // Nothing depends on the pixel before: compilers take several at once.
+                for (i, (((a, b), c), q)) in rows.enumerate() {
+                    let ray = reflected(&view, &facet, centre(from + i), cy);
+                    (*a, *b, *c, *q) = (ray[0], ray[1], ray[2], ray[3]);
                 }
             }
         }
@@ -148,6 +154,29 @@ impl RayField {
     pub(crate) fn at(&self, [x, y]: [usize; 2]) -> [f32; 4] {
         let at = y * TILE + x;
         [self.field[0][at], self.field[1][at], self.field[2][at], self.field[3][at]]
+    }
+
+    /// Along the view ray of a pixel, 1 along the eye's `forward`.
+    pub(crate) fn view_at(&self, [x, y]: [usize; 2]) -> Vec3 {
+        let (x, y) = (centre(x), centre(y));
+        Vec3::new(self.view.get(0, x, y), self.view.get(1, x, y), self.view.get(2, x, y))
+    }
+
+    /// How that moves with the pixel, one to the right and one down.
+    pub(crate) fn view_steps(&self) -> [Vec3; 2] {
+        [self.view.right.into(), self.view.down.into()]
+    }
+
+    /// The field at the 4 x 4 pixels from a column and row on, by row; any numbers where nothing was filled in.
+    pub(crate) fn block(&self, [x, y]: [usize; 2]) -> [[f32; 16]; 4] {
+        let mut block = [[0.0; 16]; 4];
+        for (block, field) in block.iter_mut().zip(&self.field) {
+            for row in 0..4 {
+                let from = (y + row) * TILE + x;
+                block[4 * row..4 * row + 4].copy_from_slice(&field[from..from + 4]);
+            }
+        }
+        block
     }
 
     /// The field about a pixel as its own triangle continues it.

@@ -79,7 +79,22 @@ impl Backend for Cpu {
                     add(&mut report.passes_ms, milliseconds(start));
                 }
                 Pass::Gather(pass) => {
-                    add(&mut report.rays_ms, pass.kernel.gather(out, &plan.cx)?.rays_ms);
+                    let done = pass.kernel.gather(out, &plan.cx)?;
+                    match done.surfels {
+                        None => add(&mut report.rays_ms, done.rays_ms),
+                        Some(counts) => {
+                            add(&mut report.passes_ms, milliseconds(start));
+                            report.cameras = Some(counts.cameras);
+                            report.patches += counts.patches;
+                            report.batches = Some(counts.batches);
+                            report.projections = Some(counts.projections);
+                            report.valid = Some(counts.valid);
+                            let per_thread = 1e-6 / rayon::current_num_threads() as f64;
+                            add(&mut report.cameras_ms, counts.cameras_ns as f64 * per_thread);
+                            add(&mut report.cull_ms, counts.walk_ns as f64 * per_thread);
+                            add(&mut report.splat_ms, counts.splat_ns as f64 * per_thread);
+                        }
+                    }
                 }
                 Pass::Lookup(pass) => {
                     lookup::lookup(pass, scene, visibility, &lookup::by_cpu, out)?;

@@ -199,6 +199,10 @@ impl Backend for Gpu {
         Some(format!("{}, {path} path", self.name))
     }
 
+    fn gathers(&self) -> bool {
+        false
+    }
+
     fn execute(
         &mut self,
         plan: &Plan<'_>,

@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use super::records::{LAYOUT, NO_OWNER};
 use super::surfaces::{PAINTS, SURFACE_ROWS};
 use crate::backend::cpu::search::raster::BACK_SLACK;
-use crate::backend::cpu::splat::{EDGE_TOLERANCE, blend, projection};
+use crate::backend::cpu::splat::{EDGE_TOLERANCE, projection};
 use crate::camera::reflector::{self, estalella, roger};
 use crate::camera::three_ray::project::NOISE_ROUNDINGS;
 use crate::camera::three_ray::solve::MAX_STEPS;
 use crate::geometry::lanes::Scalar;
-use crate::plan::{CELL_SLACK_PX, LARGEST_ELLIPSE, SplatShape};
+use crate::plan::{CELL_SLACK_PX, LARGEST_ELLIPSE, SplatShape, kernel};
 use crate::scene::{environment, shade};
 use crate::visibility::SAMPLE_EIGHTHS;
 
@@ -81,25 +81,25 @@ fn constants(shape: SplatShape) -> String {
         ("EDGE_TOLERANCE", EDGE_TOLERANCE),
         ("LARGEST_ELLIPSE", LARGEST_ELLIPSE),
         ("CELL_SLACK_PX", CELL_SLACK_PX),
-        ("SPREAD", projection::SPREAD),
-        ("PIXEL", projection::PIXEL),
-        ("PER_DISK", projection::PER_DISK),
-        ("LEAST_FACING", projection::LEAST_FACING),
+        ("SPREAD", kernel::SPREAD),
+        ("PIXEL", kernel::PIXEL),
+        ("PER_DISK", kernel::PER_DISK),
+        ("LEAST_FACING", kernel::LEAST_FACING),
         ("MOST_CORRECTION_PX", projection::MOST_CORRECTION_PX),
-        ("SAME_SURFACE_RADII", projection::SAME_SURFACE),
-        ("SAME_SURFACE_SHARE", blend::SAME_SURFACE),
-        ("SLOPE", blend::SLOPE),
-        ("GAIN", blend::GAIN),
-        ("CLOSING", blend::CLOSING),
-        ("CLOSING_TWO", blend::CLOSING_TWO),
-        ("SURROUNDED", blend::SURROUNDED),
-        ("AROUND_WITHIN", blend::ALL_AROUND[0]),
-        ("AROUND_BEYOND", blend::ALL_AROUND[1]),
-        ("LARGE_FROM", blend::LARGE[0]),
-        ("LARGE_TO", blend::LARGE[1]),
-        ("GAP_FROM", blend::GAP[0]),
-        ("GAP_TO", blend::GAP[1]),
-        ("WHOLE", blend::WHOLE),
+        ("SAME_SURFACE_RADII", kernel::SAME_SURFACE_RADII),
+        ("SAME_SURFACE_SHARE", kernel::SAME_SURFACE_SHARE),
+        ("SLOPE", kernel::SLOPE),
+        ("GAIN", kernel::GAIN),
+        ("CLOSING", kernel::CLOSING),
+        ("CLOSING_TWO", kernel::CLOSING_TWO),
+        ("SURROUNDED", kernel::SURROUNDED),
+        ("AROUND_WITHIN", kernel::ALL_AROUND[0]),
+        ("AROUND_BEYOND", kernel::ALL_AROUND[1]),
+        ("LARGE_FROM", kernel::LARGE[0]),
+        ("LARGE_TO", kernel::LARGE[1]),
+        ("GAP_FROM", kernel::GAP[0]),
+        ("GAP_TO", kernel::GAP[1]),
+        ("WHOLE", kernel::WHOLE),
     ];
     for (name, value) in numbers {
         writeln!(text, "const {name}: f32 = {value:?}f;").expect("strings grow");

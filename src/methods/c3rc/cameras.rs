@@ -107,10 +107,12 @@ fn of_triangle<'a>(frame: FrameInput<'_>, patch: &'a Patch, scale: RayScale) -> 
 
 /// The clouds' boxes in scene space, eight at a time.
 pub(super) struct Top {
-    objects: Vec<WideNode>,
-    mirrors: Vec<WideNode>,
+    pub(super) objects: Vec<WideNode>,
+    pub(super) mirrors: Vec<WideNode>,
+    /// By group and slot, the objects' first: how far a kernel reaches beyond its surfel, scene units.
+    pub(super) reaches: Vec<[f32; CHILDREN]>,
     /// Mirrors nearer to where a ray starts than this do not hide what it sees.
-    clearance: f64,
+    pub(super) clearance: f64,
     /// No object is farther from the eye than this.
     reach: f64,
     pub(super) level: Level,
@@ -127,11 +129,25 @@ impl Top {
         Self {
             objects: groups(objects),
             mirrors: groups(mirrors),
+            reaches: reaches(objects).chain(reaches(mirrors)).collect(),
             clearance: f64::from(scene.mirror_clearance()),
             reach: objects.iter().map(far).fold(0.0, f64::max),
             level: simd_level(),
         }
     }
+}
+
+/// How far surfels' kernels reach.
+fn reaches(clouds: &[Cloud]) -> impl Iterator<Item = [f32; CHILDREN]> {
+    clouds.chunks(CHILDREN).map(|clouds| {
+        let mut reach = [0.0; CHILDREN];
+        for (reach, cloud) in reach.iter_mut().zip(clouds) {
+            #[expect(clippy::cast_possible_truncation, reason = "a bound, not a measure")]
+            let scale = cloud.to_scene.scale as f32;
+            *reach = 2.0 * cloud.extent * scale;
+        }
+        reach
+    })
 }
 
 fn groups(clouds: &[Cloud]) -> Vec<WideNode> {

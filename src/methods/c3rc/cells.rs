@@ -98,7 +98,7 @@ fn sparse(shown: &Mask) -> Mask {
 
 /// Whether a tile sees no object, by some of its rays and all of its depths.
 #[inline(always)]
-fn sees_nothing<S: Simd>(
+pub(super) fn sees_nothing<S: Simd>(
     simd: S,
     frame: FrameInput<'_>,
     top: &Top,

@@ -1,6 +1,10 @@
 //! The hybrid method of Mei, Popescu & Sacks 2007: every visible mirror triangle is a continuous 3-ray camera,
 //! culled against the surfels' trees (backward), which then projects and splats what is left (forward).
+//!
+//! Cameras are the mirror's triangles, as in the paper; or cells of the picture ([`cells`]); or blocks of pixels ([`beams`]), whose
+//! rays are each taken as they are, so that nothing has to be solved: on the CPU that is the fastest and the most accurate.
 
+mod beams;
 mod cameras;
 mod cells;
 mod footprint;
@@ -15,7 +19,7 @@ use super::{
 use crate::camera::three_ray::BoxTest;
 use crate::cull::Culler;
 use crate::error::{Error, Result};
-use crate::plan::{DepthKey, Pass, Pixels, Plan, SplatPass, SplatShape};
+use crate::plan::{DepthKey, GatherPass, Pass, Pixels, Plan, SplatPass, SplatShape};
 use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::{MirrorTriangleIndex, PatchScratch, patches};
 
@@ -30,10 +34,10 @@ static INFO: MethodInfo = MethodInfo {
     params: &[
         ParamInfo {
             id: "cameras",
-            about: "what one camera sees for: a triangle of the mirror, or pixels whose exact rays are nearly linear",
+            about: "what one camera sees for: 4 x 4 pixels by their exact rays (with ellipses, on the CPU; else cells), pixels whose rays are nearly linear, or a triangle of the mirror",
             unit: "",
-            kind: ParamKind::Choice(&["triangles", "cells"]),
-            default: Value::Choice("cells"),
+            kind: ParamKind::Choice(&["triangles", "cells", "blocks"]),
+            default: Value::Choice("blocks"),
             is_quality_knob: true,
         },
         ParamInfo {
@@ -104,7 +108,7 @@ static INFO: MethodInfo = MethodInfo {
         Preset {
             id: "best",
             about: "four ellipses a pixel",
-            params: &[("cameras", "cells"), ("splat", "ellipse"), ("detail", "4")],
+            params: &[("cameras", "blocks"), ("splat", "ellipse"), ("detail", "4")],
             leaf_points: None,
         },
     ],
@@ -123,6 +127,18 @@ pub(crate) fn culler<'a>(scene: &'a PreparedScene, params: &Params) -> Culler<'a
         _ => BoxTest::Slab,
     };
     Culler::new(scene, test)
+}
+
+/// Whether blocks draw what is asked for: they do not know the other shapes, tests and keys, which are about cameras.
+fn in_blocks(params: &Params) -> bool {
+    let only = [
+        ("cameras", "blocks"),
+        ("splat", "ellipse"),
+        ("test", "slab"),
+        ("depth", "lambda"),
+        ("roots", "all"),
+    ];
+    only.into_iter().all(|(id, value)| params.choice(id) == value)
 }
 
 impl Method for C3rc {
@@ -151,7 +167,7 @@ impl Method for C3rc {
             detail: f64::from(detail),
             mirror_occlusion: params.choice("mirror-occlusion") == "on",
         };
-        if params.choice("cameras") == "cells" {
+        if params.choice("cameras") != "triangles" {
             for (id, value) in [("test", "paper"), ("ray-scale", "unit")] {
                 if params.choice(id) == value {
                     let what = format!("--{id} {value}");
@@ -160,8 +176,13 @@ impl Method for C3rc {
                 }
             }
         }
+        if out.gathers && in_blocks(params) {
+            let kernel = beams::Kernel { frame, settings };
+            out.passes.push(Pass::Gather(GatherPass { kernel: Box::new(kernel) }));
+            return Ok(());
+        }
         let corners = |t: MirrorTriangleIndex| scene.mirror_triangle(t.0).corners;
-        let (patches, pixels, cameras) = if params.choice("cameras") == "cells" {
+        let (patches, pixels, cameras) = if params.choice("cameras") != "triangles" {
             cells::cells(frame, settings)
         } else {
             let mut list = Vec::new();

@@ -7,30 +7,10 @@ use glam::{Vec3, Vec4};
 use super::EMPTY;
 use super::hits::{DEPTH_RANGE, FORM, HALF, Hits, MIDDLE, WEIGHT};
 use crate::geometry::lanes::{Real, Vector};
+use crate::plan::kernel::{
+    CLOSING, CLOSING_TWO, GAIN, LARGE, SAME_SURFACE_SHARE, SLOPE, SURROUNDED, WHOLE, closed,
+};
 
-/// How much of a pixel splats cover for each part that their areas say: they are not spread so evenly that the areas
-/// add up everywhere (untuned).
-pub(crate) const GAIN: f32 = 1.3;
-/// From this coverage on a gap between covered pixels is closed (untuned).
-pub(crate) const CLOSING: f32 = 0.4;
-/// The same of gaps two pixels wide, for both: what is less may be an edge (untuned).
-pub(crate) const CLOSING_TWO: f32 = 0.75;
-/// Where less of a surface landed between four pixels that show so much of it, they say what is there (untuned).
-pub(crate) const SURROUNDED: f32 = 0.9;
-/// Of a pixel that is covered, but for rounding.
-pub(crate) const WHOLE: f32 = 0.999_99;
-/// Three pixels in a row show one surface if the depth in the middle is that between the others but for this share of it, and
-/// for a part of what these differ by, [`SLOPE`], as the nearest splats do not lie in the pixels' middles (untuned).
-pub(crate) const SAME_SURFACE: f32 = 0.02;
-/// See [`SAME_SURFACE`] (untuned).
-pub(crate) const SLOPE: f32 = 0.125;
-/// Where the splats of a surface lie about a pixel, in the mean and in their own size: nearer than the first, all around it, which
-/// is then in a gap between them; farther than the second, it is beyond the surface's edge (untuned).
-pub(crate) const ALL_AROUND: [f32; 2] = [0.35, 0.6];
-/// Splats of half this size, px, may show something that lies within a pixel; from the second on they do not (untuned).
-pub(crate) const LARGE: [f32; 2] = [1.0, 2.0];
-/// Gaps that splats cover less than the first of stay open, those with more than the second do not (untuned).
-pub(crate) const GAP: [f32; 2] = [0.4, 0.5];
 /// Splats drawn before it is asked whether any pixel is still open (untuned).
 const UNTIL_FULL: usize = 32;
 
@@ -90,17 +70,6 @@ struct Across {
     between: Option<usize>,
     /// How far from `a` to `b` the gap's own slot lies.
     share: f32,
-}
-
-/// How full of its front a pixel counts, where that covers `full` of it: its splats may lie all around, but too far apart.
-#[inline(always)]
-fn closed<R: Real<Scalar = f32>>(full: R, about: [R; 2]) -> R {
-    let (one, zero) = (full.splat(1.0), full.splat(0.0));
-    let far = (about[0] * about[0] + about[1] * about[1]) / (full * full);
-    let [within, beyond] = ALL_AROUND.map(|share| share * share);
-    let around = ((-far + beyond) * (1.0 / (beyond - within))).max(zero).min(one);
-    let some = ((full - GAP[0]) * (1.0 / (GAP[1] - GAP[0]))).max(zero).min(one);
-    full + (one - full) * (around * some)
 }
 
 impl Layers {
@@ -374,7 +343,7 @@ impl Layers {
             }
             let slope = if count == 2.0 { (depths[0] - depths[1]).abs() } else { 0.0 };
             let off = (0.5 * (depths[0] + depths[1]) - near).abs();
-            if off > SAME_SURFACE * near + SLOPE * slope {
+            if off > SAME_SURFACE_SHARE * near + SLOPE * slope {
                 return None;
             }
             own += count;
@@ -416,7 +385,8 @@ impl Layers {
             for Across { a, b, between, share } in self.across(slot) {
                 let depths = [get(NEAR, a), get(NEAR, b)];
                 let off = (depths[0] + (depths[1] - depths[0]) * share - near).abs();
-                let alike = off <= SAME_SURFACE * near + SLOPE * (depths[0] - depths[1]).abs();
+                let alike =
+                    off <= SAME_SURFACE_SHARE * near + SLOPE * (depths[0] - depths[1]).abs();
                 let covered = of_front(a).min(of_front(b));
                 let narrow = between.is_none_or(|c| of_front(c).min(front) >= CLOSING_TWO);
                 if covered > closed && alike && narrow {

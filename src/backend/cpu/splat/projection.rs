@@ -9,8 +9,9 @@ use crate::camera::three_ray::project::along;
 use crate::camera::three_ray::{Image, project};
 use crate::geometry::Surfels;
 use crate::geometry::lanes::{Real, Vector, cross, dot, dot_const};
+use crate::plan::kernel::{LEAST_FACING, PER_DISK, PIXEL, SAME_SURFACE_RADII, SPREAD};
 use crate::plan::{
-    CELL_SLACK_PX, CameraInstance, DepthKey, EVENNESS, LARGEST_ELLIPSE, SplatPass, SplatShape,
+    CELL_SLACK_PX, CameraInstance, DepthKey, LARGEST_ELLIPSE, SplatPass, SplatShape,
 };
 use crate::visibility::Patch;
 
@@ -22,11 +23,6 @@ struct Kernel<R> {
     /// Value in the middle: its integral is the disk's area.
     weight: R,
 }
-
-/// The kernel of a disk is so many times as wide as the disk that holds a surfel (untuned).
-pub(crate) const SPREAD: f32 = 1.3;
-/// Radius of the kernel of a point, in pixels: what a pixel sees of it (untuned).
-pub(crate) const PIXEL: f32 = 0.7;
 
 impl<R: Real<Scalar = f32>> Kernel<R> {
     /// Of the disk that holds a surfel, see [`Frame::form`], and the form's determinant. Of a thin ellipse it would be
@@ -85,15 +81,8 @@ impl<R: Real<Scalar = f32>> Frame<R> {
     }
 }
 
-/// A surfel's own disk has this share of the area of the one that holds a surfel.
-pub(crate) const PER_DISK: f32 = 1.0 / (EVENNESS * EVENNESS);
-/// Surfels are not taken for thinner than this share of their width (untuned).
-pub(crate) const LEAST_FACING: f32 = 0.2;
 /// A correction is no longer than this: beyond it the camera says nothing of the exact rays.
 pub(crate) const MOST_CORRECTION_PX: f32 = 2.0;
-/// Surfels within so many of their radii in depth show one surface, also where it is steep: with 3, what is behind showed through
-/// things close to a mirror.
-pub(crate) const SAME_SURFACE: f32 = 6.0;
 /// Of any vector.
 const MOST_LANES: usize = 32;
 
@@ -204,7 +193,8 @@ impl Projection<'_> {
                     if !V::any(lands) {
                         continue;
                     }
-                    let range = V::broadcast(simd, SAME_SURFACE * self.camera.radius) / size.sqrt();
+                    let range =
+                        V::broadcast(simd, SAME_SURFACE_RADII * self.camera.radius) / size.sqrt();
                     let values = [x, y, form[0], form[1], form[2], wide, high, weight, range];
                     for (value, list) in values.into_iter().zip(&mut hits.ellipse) {
                         value.compress(lands, &mut list[len..]);

@@ -1,0 +1,279 @@
+//! A beam: the rays of some pixels of a block, each exactly, and what bounds them.
+
+use fearless_simd::{Simd, f32x16};
+use glam::{DMat3, DVec3, Mat3, Vec3};
+
+use crate::camera::Eye;
+use crate::geometry::Similarity;
+use crate::geometry::lanes::{Real, Vector, dot_const};
+use crate::plan::LARGEST_ELLIPSE;
+use crate::visibility::mirror_rays::{Linear, RayField, TILE};
+
+/// Columns and rows of a block.
+pub(super) const BLOCK: usize = 4;
+/// Pixels of a block: lanes.
+pub(super) const LANES: usize = BLOCK * BLOCK;
+/// Rays belong to one beam if the linear function that describes its first one's neighbourhood is no farther off than this, in
+/// pixels (untuned).
+const ALIKE_PX: f32 = 1.5;
+/// Rays of one beam start so many pixels' steps from its first one at most (untuned).
+const NEAR_PX: f32 = 12.0;
+/// The least cosine of a ray's angle with the beam's axis.
+const AHEAD: f32 = 0.6;
+
+/// Rays in the beam's own frame: axes u, v and, along its first ray, a. At the distance s along a, the ray of a pixel crosses the plane
+/// (u, v) at start + s · slope.
+#[derive(Clone, Debug)]
+pub(super) struct Beam {
+    /// Where the first ray starts, and the axes; scene space.
+    pub(super) origin: Vec3,
+    pub(super) axes: [Vec3; 3],
+    /// Bit i: pixel i of the block is the beam's.
+    pub(super) pixels: u32,
+    /// By axis and pixel.
+    pub(super) start: [[f32; LANES]; 2],
+    /// By axis and pixel.
+    pub(super) slope: [[f32; LANES]; 2],
+    /// Where along the axis each pixel's ray starts.
+    pub(super) begin: [f32; LANES],
+    /// Where the first of them does.
+    pub(super) first: f32,
+    /// Least and most of starts and slopes, by axis.
+    pub(super) starts: [[f32; 2]; 2],
+    pub(super) slopes: [[f32; 2]; 2],
+    /// How a ray's place in the plane moves with its pixel, one to the right and one down: by axis, at s = 0 and by s.
+    pub(super) step: [[f32; 2]; 2],
+    pub(super) step_per_s: [[f32; 2]; 2],
+    /// Length of the first ray's direction: its λ is s by this.
+    pub(super) length: f32,
+    /// Tangent of the widest angle of a ray with the axis.
+    pub(super) spread: f32,
+}
+
+/// Relative to a beam's own space: what a cloud's space has for it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub(super) origin: [f32; 3],
+    pub(super) axes: [[f32; 3]; 3],
+    /// Cloud units a scene unit.
+    pub(super) per_scene: f32,
+}
+
+impl Beam {
+    /// The beam of the pixel `seed` of a tile and of those pixels of its block, among `left` (by lane), that go on from it.
+    /// `corner`: the block's first column and row.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(
+        simd: S,
+        eye: &Eye,
+        field: &RayField,
+        tangent: &Linear<4>,
+        corner: [usize; 2],
+        seed: usize,
+        left: u32,
+    ) -> Self {
+        let at = [corner[0] + seed % BLOCK, corner[1] + seed / BLOCK];
+        let [f0, f1, f2, q] = field.at(at);
+        let toward = Vec3::new(f0, f1, f2);
+        let length = toward.length();
+        let axis = toward / length;
+        let view = field.view_at(at);
+        let origin = eye.position + view / q;
+        let of = |l: &[f32; 4]| Vec3::new(l[0], l[1], l[2]);
+        let turn = [of(&tangent.right) / length, of(&tangent.down) / length];
+        let moved = field.view_steps();
+        let shift = [
+            (moved[0] - view * (tangent.right[3] / q)) / q,
+            (moved[1] - view * (tangent.down[3] / q)) / q,
+        ];
+        // The axes lie along and across the direction in which rays part most.
+        let (e1, e2) = axis.any_orthonormal_pair();
+        let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
+        for t in turn {
+            let (a, b) = (e1.dot(t), e2.dot(t));
+            (uu, uv, vv) = (uu + a * a, uv + a * b, vv + b * b);
+        }
+        let (cosine, sine) = half_angle(uu - vv, 2.0 * uv);
+        let axes = [e1 * cosine + e2 * sine, e2 * cosine - e1 * sine, axis];
+        let [u, v, a] = axes;
+        let step = [u, v].map(|e| shift.map(|s| e.dot(s)));
+        let step_per_s = [u, v].map(|e| turn.map(|t| e.dot(t)));
+        let widths = step_per_s.map(|[x, y]| (x * x + y * y).sqrt() + 0.1 / eye.focal_px);
+        let reach = NEAR_PX * (shift[0].length() + shift[1].length());
+        let mut beam = Self {
+            origin,
+            axes,
+            pixels: 0,
+            start: [[0.0; LANES]; 2],
+            slope: [[0.0; LANES]; 2],
+            begin: [0.0; LANES],
+            first: 0.0,
+            starts: [[0.0; 2]; 2],
+            slopes: [[0.0; 2]; 2],
+            step,
+            step_per_s,
+            length: length / q,
+            spread: 0.0,
+        };
+        // All rays of the block, a lane each.
+        let block = field.block(corner);
+        let load = [
+            F::<S>::load(simd, &block[0]),
+            F::<S>::load(simd, &block[1]),
+            F::<S>::load(simd, &block[2]),
+        ];
+        let zero = F::<S>::broadcast(simd, 0.0);
+        let one = zero.splat(1.0);
+        let own = F::<S>::mask(simd, u64::from(left));
+        let along = dot_const(load, a.to_array());
+        let squared = load[0] * load[0] + load[1] * load[1] + load[2] * load[2];
+        // Lanes that are not among `left` hold anything.
+        let ahead = own & zero.lt(along) & (squared * (AHEAD * AHEAD)).le(along * along);
+        let per_along = one / F::<S>::select(ahead, along, one);
+        let slope =
+            [dot_const(load, u.to_array()) * per_along, dot_const(load, v.to_array()) * per_along];
+        let depth = one / F::<S>::select(ahead, F::<S>::load(simd, &block[3]), one);
+        let dx = F::<S>::load(simd, &COLUMNS) - (seed % BLOCK) as f32;
+        let dy = F::<S>::load(simd, &ROWS) - (seed / BLOCK) as f32;
+        let from = eye.position - origin;
+        let [right, down] = moved;
+        let start_of = [
+            (dx * right.x + dy * down.x + view.x) * depth + from.x,
+            (dx * right.y + dy * down.y + view.y) * depth + from.y,
+            (dx * right.z + dy * down.z + view.z) * depth + from.z,
+        ];
+        let before = dot_const(start_of, a.to_array());
+        let start = [
+            dot_const(start_of, u.to_array()) - slope[0] * before,
+            dot_const(start_of, v.to_array()) - slope[1] * before,
+        ];
+        let off_u = (slope[0] - dx * step_per_s[0][0] - dy * step_per_s[0][1]) * (1.0 / widths[0]);
+        let off_v = (slope[1] - dx * step_per_s[1][0] - dy * step_per_s[1][1]) * (1.0 / widths[1]);
+        let apart =
+            start_of[0] * start_of[0] + start_of[1] * start_of[1] + start_of[2] * start_of[2];
+        let alike = ahead
+            & (off_u * off_u + off_v * off_v).le(zero.splat(ALIKE_PX * ALIKE_PX))
+            & apart.le(zero.splat(reach * reach));
+        let alike = alike | F::<S>::mask(simd, 1 << seed);
+        #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+        let pixels = F::<S>::bits(alike) as u32;
+        beam.pixels = pixels;
+        let (mut widest, far) = (zero, zero.splat(f32::MAX));
+        for k in 0..2 {
+            // The first ray is the axis itself.
+            let is_seed = F::<S>::mask(simd, 1 << seed);
+            let start = F::<S>::select(is_seed | !alike, zero, start[k]);
+            let slope = F::<S>::select(is_seed | !alike, zero, slope[k]);
+            Vector::<S>::store(start, &mut beam.start[k]);
+            Vector::<S>::store(slope, &mut beam.slope[k]);
+            widest = widest + slope * slope;
+            beam.starts[k] = ends(start, alike, far);
+            beam.slopes[k] = ends(slope, alike, far);
+        }
+        let before = F::<S>::select(F::<S>::mask(simd, 1 << seed) | !alike, zero, before);
+        Vector::<S>::store(before, &mut beam.begin);
+        beam.first = ends(before, alike, far)[0];
+        beam.spread = ends(widest, alike, far)[1].sqrt();
+        beam
+    }
+
+    /// Where in the picture a place (u, v, s) near the ray of a pixel, the one at `px`, is seen. That pixel's middle where neighbours'
+    /// rays do not tell.
+    pub(super) fn seen_at(&self, lane: usize, px: [usize; 2], [u, v, s]: [f32; 3]) -> [f32; 2] {
+        let off = [u, v];
+        let [du, dv] = [0, 1].map(|k| off[k] - self.start[k][lane] - s * self.slope[k][lane]);
+        let step = |k: usize, i: usize| self.step[k][i] + s * self.step_per_s[k][i];
+        let (a, b, c, d) = (step(0, 0), step(0, 1), step(1, 0), step(1, 1));
+        let det = a * d - b * c;
+        let moved = [(d * du - b * dv) / det, (a * dv - c * du) / det];
+        // A splat does not reach farther.
+        let [x, y] = moved.map(|m| if m.abs() <= LARGEST_ELLIPSE { m } else { 0.0 });
+        [px[0] as f32 + 0.5 + x, px[1] as f32 + 0.5 + y]
+    }
+
+    /// Its frame in a cloud's space.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
+    pub(super) fn frame(&self, place: &Place) -> Frame {
+        let origin = place.inverse * (self.origin.as_dvec3() - place.translation);
+        Frame {
+            origin: origin.to_array().map(|x| x as f32),
+            axes: self.axes.map(|e| (place.turn * e).to_array()),
+            per_scene: place.per_scene,
+        }
+    }
+}
+
+/// From the scene to a cloud's space.
+pub(super) struct Place {
+    /// Of positions relative to `translation`.
+    inverse: DMat3,
+    translation: DVec3,
+    /// Of directions.
+    turn: Mat3,
+    per_scene: f32,
+}
+
+impl Place {
+    #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
+    pub(super) fn new(to_scene: &Similarity) -> Self {
+        let back = DMat3::from_quat(to_scene.rotation.conjugate());
+        Self {
+            inverse: back * (1.0 / to_scene.scale),
+            translation: to_scene.translation,
+            turn: back.as_mat3(),
+            per_scene: (1.0 / to_scene.scale) as f32,
+        }
+    }
+}
+
+type F<S> = f32x16<S>;
+
+/// The least and the most of the lanes of `mask`, which has some.
+#[inline(always)]
+fn ends<S: Simd>(values: F<S>, mask: <F<S> as Real>::Mask, far: F<S>) -> [f32; 2] {
+    let (mut low, mut high) = ([0.0f32; LANES], [0.0f32; LANES]);
+    Vector::<S>::store(F::<S>::select(mask, values, far), &mut low);
+    Vector::<S>::store(F::<S>::select(mask, values, -far), &mut high);
+    let mut half = LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            low[i] = low[i].min(low[i + half]);
+            high[i] = high[i].max(high[i + half]);
+        }
+        half /= 2;
+    }
+    [low[0], high[0]]
+}
+
+/// By lane.
+const COLUMNS: [f32; LANES] =
+    [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
+const ROWS: [f32; LANES] =
+    [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
+
+/// Cosine and sine of half the angle of a direction; of none for no direction.
+fn half_angle(x: f32, y: f32) -> (f32, f32) {
+    let length = (x * x + y * y).sqrt();
+    if length <= 0.0 || !length.is_finite() {
+        return (1.0, 0.0);
+    }
+    let double = x / length;
+    if double >= 0.0 {
+        let cosine = (0.5 + 0.5 * double).sqrt();
+        (cosine, 0.5 * y / length / cosine)
+    } else {
+        let sine = (0.5 - 0.5 * double).sqrt();
+        (0.5 * y / length / sine, sine)
+    }
+}
+
+/// Lanes of a block that are among a tile's pixels.
+pub(super) fn lanes(mask: &[u32; TILE], [x, y]: [usize; 2]) -> u32 {
+    (0..BLOCK).fold(0, |all, row| all | (mask[y + row] >> x & ((1 << BLOCK) - 1)) << (BLOCK * row))
+}
+
+/// The lane among `left` nearest to the block's middle.
+pub(super) fn seed(left: u32) -> usize {
+    const BY_DISTANCE: [usize; LANES] = [5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15];
+    BY_DISTANCE.into_iter().find(|lane| left >> lane & 1 != 0).unwrap_or(0)
+}

@@ -1,0 +1,371 @@
+//! Beams: the mirrors' pixels in blocks of 4 x 4, each of which walks the trees once for all its rays.
+
+mod beam;
+mod blend;
+mod close;
+mod seen;
+mod walk;
+
+use std::time::Instant;
+
+use fearless_simd::{Simd, dispatch};
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+
+use self::beam::{BLOCK, Beam, Place, lanes, seed};
+use self::blend::CONTACT;
+use self::close::{Layer, Pixels};
+use self::seen::Seen;
+use self::walk::{Splats, Walk, clouds_met};
+use super::super::FrameInput;
+use super::cameras::{CameraSettings, Top};
+use super::cells::sees_nothing;
+use crate::accel::kd_tree::{CHILDREN, WideNode};
+use crate::context::Context;
+use crate::error::Result;
+use crate::image::{Planes, Reason};
+use crate::plan::{GatherCounts, GatherKernel, GatherTimes, Reflection};
+use crate::visibility::mirror_rays::{RayField, TILE, TILE_PX};
+
+pub(super) struct Kernel<'a> {
+    pub(super) frame: FrameInput<'a>,
+    pub(super) settings: CameraSettings,
+}
+
+/// Memory of a thread.
+struct Scratch {
+    field: Box<RayField>,
+    splats: Splats,
+    order: Vec<u64>,
+    met: Vec<Met>,
+    shown: Vec<Shown>,
+}
+
+/// A cloud that a beam may meet, from where on its axis.
+#[derive(Clone, Copy)]
+struct Met {
+    near: f32,
+    cloud: usize,
+}
+
+/// What the nearest splat of a pixel shows.
+#[derive(Clone, Copy)]
+struct Shown {
+    pixel: usize,
+    surfel: u32,
+    lambda: f32,
+    /// Where it is seen.
+    splat: [f32; 2],
+}
+
+/// A tile's rows of the picture.
+struct Band<'a> {
+    radiance: &'a mut [Vec3],
+    coverage: &'a mut [f32],
+    layers: &'a mut [Layer],
+    /// Whether it is wanted what each pixel shows.
+    describes: bool,
+}
+
+/// What all beams share.
+struct Shared {
+    top: Top,
+    places: Vec<Place>,
+    /// Mirrors hide from that far on along a ray.
+    clear: f32,
+    detail: f32,
+}
+
+impl GatherKernel for Kernel<'_> {
+    fn gather(&self, out: &mut Reflection, cx: &Context) -> Result<GatherTimes> {
+        let size = self.frame.eye.size;
+        let scene = self.frame.scene;
+        let shared = Shared {
+            top: Top::new(scene, self.frame.eye),
+            places: scene.clouds.iter().map(|c| Place::new(&c.to_scene)).collect(),
+            clear: scene.mirror_clearance(),
+            #[expect(clippy::cast_possible_truncation, reason = "a small number")]
+            detail: self.settings.detail as f32,
+        };
+        out.radiance.resize(size.pixels(), Vec3::ZERO);
+        out.coverage.resize(size.pixels(), 0.0);
+        out.coverage.fill(0.0);
+        let mut layers = vec![Layer::default(); size.pixels()];
+        let rows = (size.width * TILE_PX) as usize;
+        let describes = out.planes.is_some();
+        let bands: Vec<Result<(GatherCounts, Vec<Shown>)>> = out
+            .radiance
+            .par_chunks_mut(rows)
+            .zip(out.coverage.par_chunks_mut(rows))
+            .zip(layers.par_chunks_mut(rows))
+            .enumerate()
+            .map_init(Scratch::new, |scratch, (band, ((radiance, coverage), layers))| {
+                let mut counts = GatherCounts::default();
+                let top = u32::try_from(band).unwrap_or(u32::MAX) * TILE_PX;
+                let mut band = Band { radiance, coverage, layers, describes };
+                for column in 0..size.width.div_ceil(TILE_PX) {
+                    cx.check()?;
+                    let origin = [column * TILE_PX, top];
+                    dispatch!(shared.top.level, simd => self.tile(simd, &shared, origin, scratch, &mut band, &mut counts));
+                }
+                Ok((counts, std::mem::take(&mut scratch.shown)))
+            })
+            .collect();
+        let mut counts = GatherCounts::default();
+        let mut shown = Vec::new();
+        for band in bands {
+            let (more, list) = band?;
+            counts = counts.plus(more);
+            shown.extend(list);
+        }
+        self.close(&layers, out);
+        if let Some(planes) = out.planes.as_deref_mut() {
+            planes.coverage.copy_from_slice(&out.coverage);
+            self.describe(&shown, planes);
+        }
+        Ok(GatherTimes { surfels: Some(counts), ..GatherTimes::default() })
+    }
+}
+
+impl Scratch {
+    fn new() -> Self {
+        Self {
+            field: RayField::new(),
+            splats: Splats::default(),
+            order: Vec::new(),
+            met: Vec::new(),
+            shown: Vec::new(),
+        }
+    }
+}
+
+impl Kernel<'_> {
+    /// Closes gaps.
+    fn close(&self, layers: &[Layer], out: &mut Reflection) {
+        let width = self.frame.eye.size.width as usize;
+        let pixels = Pixels { width, radiance: &out.radiance, coverage: &out.coverage, layers };
+        let rows = width * TILE;
+        let closed: Vec<Vec<(usize, Vec4)>> = (0..layers.len().div_ceil(rows))
+            .into_par_iter()
+            .map(|band| {
+                let range = band * rows..((band + 1) * rows).min(layers.len());
+                range.filter_map(|at| Some((at, pixels.closed(at)?))).collect()
+            })
+            .collect();
+        for (at, value) in closed.into_iter().flatten() {
+            out.radiance[at] = value.truncate();
+            out.coverage[at] = value.w;
+        }
+    }
+
+    /// Says what was seen.
+    fn describe(&self, shown: &[Shown], planes: &mut Planes) {
+        let scene = self.frame.scene;
+        for &Shown { pixel, surfel, lambda, splat } in shown {
+            let cloud = scene.cloud_of_surfel(surfel);
+            let to_scene = &scene.objects[cloud].to_scene;
+            let position = scene.surfels.position(surfel as usize).as_dvec3();
+            let normal = scene.surfels.normals[surfel as usize].as_dvec3();
+            let world = to_scene.point(position) + scene.origin;
+            planes.position[pixel] = world.as_vec3().to_array();
+            planes.normal[pixel] = to_scene.direction(normal).as_vec3().to_array();
+            planes.lambda[pixel] = lambda;
+            planes.splat[pixel] = splat;
+            planes.object[pixel] = u32::try_from(cloud).expect("fewer than 2^32 objects");
+            planes.surfel[pixel] = surfel;
+            planes.images[pixel] = 1;
+            planes.reason[pixel] = Reason::Object as u32;
+        }
+    }
+}
+
+impl Kernel<'_> {
+    #[inline(always)]
+    fn tile<S: Simd>(
+        &self,
+        simd: S,
+        shared: &Shared,
+        origin: [u32; 2],
+        scratch: &mut Scratch,
+        band: &mut Band<'_>,
+        counts: &mut GatherCounts,
+    ) {
+        let FrameInput { scene, eye, visibility } = self.frame;
+        let mut watch = Watch::new();
+        let Scratch { field, splats, order, met, shown: seen_here } = scratch;
+        let shown = field.enter(simd, eye, visibility, origin);
+        if shown == [0; TILE] {
+            return;
+        }
+        let top = &shared.top;
+        if sees_nothing(simd, self.frame, top, origin, field, &shown, self.settings) {
+            counts.cameras_ns += watch.lap();
+            return;
+        }
+        field.fill(eye, scene, &shown);
+        let width = eye.size.width as usize;
+        for y in (0..TILE).step_by(BLOCK) {
+            for x in (0..TILE).step_by(BLOCK) {
+                let mut left = lanes(&shown, [x, y]);
+                while left != 0 {
+                    let seed = seed(left);
+                    let tangent = field.tangent(eye, scene, [x + seed % BLOCK, y + seed / BLOCK]);
+                    let beam = Beam::new(simd, eye, field, &tangent, [x, y], seed, left);
+                    left &= !beam.pixels;
+                    counts.patches += 1;
+                    self.meet(simd, top, &beam, met);
+                    let mut seen = Seen::new(splats, order, scene, shared.clear);
+                    let mut done = None;
+                    if !met.is_empty() {
+                        counts.cameras_ns += watch.lap();
+                        self.walk(simd, shared, &beam, met, &mut seen, counts);
+                        counts.walk_ns += watch.lap();
+                        done = (seen.splats.len > 0).then(|| seen.blend(simd, &beam));
+                    }
+                    let mut pixels = beam.pixels;
+                    while pixels != 0 {
+                        let lane = pixels.trailing_zeros() as usize;
+                        pixels &= pixels - 1;
+                        let [row, column] = [y + lane / BLOCK, x + lane % BLOCK];
+                        let at = row * width + origin[0] as usize + column;
+                        let Some(done) = &done else {
+                            band.layers[at].open = 1.0;
+                            continue;
+                        };
+                        band.layers[at] = done.layer(lane);
+                        if done.shown[lane] > 0.0 {
+                            band.radiance[at] = done.radiance(lane);
+                            band.coverage[at] = done.shown[lane];
+                            if band.describes {
+                                let first = done.first[lane].to_bits() as usize;
+                                let place = seen.splats.place(first);
+                                let from = [origin[0] as usize + column, origin[1] as usize + row];
+                                seen_here.push(Shown {
+                                    pixel: origin[1] as usize * width + at,
+                                    surfel: seen.splats.surfel[first],
+                                    lambda: place[2] / beam.length,
+                                    splat: beam.seen_at(lane, from, place),
+                                });
+                            }
+                        }
+                    }
+                    if done.is_some() {
+                        counts.splat_ns += watch.lap();
+                    }
+                }
+            }
+        }
+        counts.cameras_ns += watch.lap();
+    }
+
+    /// The objects that a beam may meet, from the nearest on.
+    #[inline(always)]
+    fn meet<S: Simd>(&self, simd: S, top: &Top, beam: &Beam, met: &mut Vec<Met>) {
+        met.clear();
+        let range = [beam.first - CONTACT * beam.length, f32::MAX];
+        add_met(simd, beam, &top.objects, &top.reaches, range, 0, met);
+        met.sort_unstable_by(|a, b| a.near.total_cmp(&b.near).then(a.cloud.cmp(&b.cloud)));
+    }
+
+    /// Walks the trees of the objects in `met`, then those of mirrors that may hide what was found.
+    #[inline(always)]
+    fn walk<S: Simd>(
+        &self,
+        simd: S,
+        shared: &Shared,
+        beam: &Beam,
+        met: &mut Vec<Met>,
+        seen: &mut Seen<'_>,
+        counts: &mut GatherCounts,
+    ) {
+        let objects = self.frame.scene.objects.len();
+        let first = beam.first - CONTACT * beam.length;
+        for met in met.iter() {
+            if met.near > seen.full_from {
+                break;
+            }
+            self.walk_cloud(simd, shared, beam, met.cloud, [first, f32::MAX], seen, counts);
+        }
+        if !self.settings.mirror_occlusion || seen.splats.len == 0 {
+            return;
+        }
+        met.clear();
+        let top = &shared.top;
+        let range = [beam.first + seen.clear, seen.farthest()];
+        if range[0] < range[1] {
+            let reaches = &top.reaches[top.objects.len()..];
+            add_met(simd, beam, &top.mirrors, reaches, range, objects, met);
+            for met in met.iter() {
+                self.walk_cloud(simd, shared, beam, met.cloud, range, seen, counts);
+            }
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "one beam, one cloud")]
+    fn walk_cloud<S: Simd>(
+        &self,
+        simd: S,
+        shared: &Shared,
+        beam: &Beam,
+        cloud: usize,
+        [first, last]: [f32; 2],
+        seen: &mut Seen<'_>,
+        counts: &mut GatherCounts,
+    ) {
+        let scene = self.frame.scene;
+        let hides = cloud >= scene.objects.len();
+        let frame = beam.frame(&shared.places[cloud]);
+        let cloud = &scene.clouds[cloud];
+        let k = frame.per_scene;
+        let inside = cloud.tree.bounds().contains(Vec3::from_array(frame.origin));
+        let mut walk = Walk {
+            beam,
+            frame,
+            cloud,
+            surfels: &scene.surfels,
+            range: [first * k, last.min(seen.full_from) * k],
+            detail: shared.detail,
+            front_only: cloud.closed && !inside && !hides,
+        };
+        counts.cameras += 1;
+        walk.run(simd, seen, counts);
+    }
+}
+
+/// Adds the clouds of some groups that a beam may meet in a range of its axis. `first`: the first group's first cloud.
+#[inline(always)]
+fn add_met<S: Simd>(
+    simd: S,
+    beam: &Beam,
+    groups: &[WideNode],
+    reaches: &[[f32; CHILDREN]],
+    range: [f32; 2],
+    first: usize,
+    met: &mut Vec<Met>,
+) {
+    for (g, (group, reach)) in groups.iter().zip(reaches).enumerate() {
+        let (mut bits, near) = clouds_met(simd, beam, group, reach, range);
+        while bits != 0 {
+            let slot = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            met.push(Met { near: near[slot], cloud: first + g * CHILDREN + slot });
+        }
+    }
+}
+
+/// Time since the last lap.
+struct Watch(Instant);
+
+impl Watch {
+    fn new() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self) -> u64 {
+        let now = Instant::now();
+        let lap = u64::try_from((now - self.0).as_nanos()).unwrap_or(u64::MAX);
+        self.0 = now;
+        lap
+    }
+}
