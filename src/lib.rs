@@ -10,7 +10,8 @@
 //! once    scene file ─► Scene ─► PreparedScene   surfels in the order of their kd-trees' leaves, mirrors' too; triangles, light
 //! frame   Eye ─► visibility ─► Visibility        per pixel: five samples of the direct view, and its mirror triangle
 //!         method ─► Plan                         passes as data
-//!           c3rc      cells or patches ─► cameras ─► Splat, Resolve     (culled while it is executed: BatchSource)
+//!           c3rc      Gather: blocks of pixels walk the trees, each pixel by its exact ray   (where the backend gathers)
+//!                     or cells, or patches ─► cameras ─► Splat, Resolve    (culled while it is executed: BatchSource)
 //!           raytrace  Gather
 //!         backend ─► Reflection                  per mirror pixel: radiance, coverage; on demand what was seen (Planes)
 //!         compose ─► Picture                     environment where nothing landed, tint, antialiased direct view
@@ -90,7 +91,8 @@
 //!   or a mirror, with their tree; those of mirrors hide what is behind them. **Samples**, per pixel, are those of the
 //!   direct view and of the ray tracer (`spp`).
 //! - **Patch**: a visible mirror triangle, or a part of a large one; or a **cell**: pixels of a 32 × 32 tile whose exact
-//!   rays are nearly linear over the picture, across triangles. **Batch**: a contiguous range of surfels
+//!   rays are nearly linear over the picture, across triangles. **Block**: 4 × 4 pixels; **beam**: those of a block's rays that go
+//!   on from each other. **Batch**: a contiguous range of surfels
 //!   that a camera has to project. **Image**: a place where a camera sees a surfel; there may be three.
 //! - **Path**: a way of light from the eye over a mirror point to a point. **Ghost**: where a range sensor at the eye would see the point
 //!   by it: straight on behind the mirror point, as far as the path is long.
@@ -102,6 +104,10 @@
 //! - A camera belongs to a *patch*, not to a mirror triangle: a large triangle has several, so that the
 //!   work of one task is bounded. Pixels are accepted by [`visibility::MirrorTriangleIndex`], cameras are
 //!   found by patch: the two indices are never mixed.
+//! - Blocks have a path of their own, from tree to pixel. In a block of 4 × 4 pixels nothing has to be solved: along a beam's axis
+//!   every pixel's ray is a known place in the plane of a surfel, so that a lane a pixel measures how far it passes by. That is exact, a
+//!   fold needs no second root, and with near nodes first the walk ends where the block is full. With cells, which keep culling, projection and
+//!   splatting apart as the paper does, the same pictures took more than twice the time.
 //! - Culling is not a pass. A splat pass carries a [`plan::BatchSource`], and the backend asks it for the
 //!   batches of a camera when it has room for them. So neither room knows the other, batches stay in the
 //!   cache, and each stage can still be timed.

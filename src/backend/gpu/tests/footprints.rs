@@ -12,7 +12,7 @@ use crate::backend::cpu::splat::projection as constants;
 use crate::context::Context;
 use crate::geometry::lanes::{Real, Scalar, cross, dot};
 use crate::methods::{FrameInput, Params, method};
-use crate::plan::{CameraInstance, LARGEST_ELLIPSE, Pass, Plan, SplatPass, SplatShape};
+use crate::plan::{CameraInstance, LARGEST_ELLIPSE, Pass, Plan, SplatPass, SplatShape, kernel};
 use crate::scene::PreparedScene;
 
 /// Of one surfel: what the shader says of its first image that is drawn.
@@ -164,7 +164,7 @@ fn by_hand<T: Scalar + Real<Scalar = T, Mask = bool>>(
     let along = dot(normal, d);
     let length = dot(d, d).sqrt();
     let facing = (along / length).to_f64().abs();
-    let least = f64::from(constants::LEAST_FACING);
+    let least = f64::from(kernel::LEAST_FACING);
     // Steps on the surfel's plane, which is not taken for steeper than `least`.
     let steep = if facing < least { along * T::from_f64(least / facing) } else { along };
     let on = |step: [T; 3]| minus(step, scaled(d, dot(normal, step) / steep));
@@ -184,13 +184,13 @@ fn by_hand<T: Scalar + Real<Scalar = T, Mask = bool>>(
     let (a, b, e) = (a + (e + limit) * per, b - b * per, e + (a + limit) * per);
     let own = (own + trace * limit) * (own / added)
         + (trace * trace - own + trace * limit + limit * limit) * per;
-    let spread = T::from_f64(f64::from(constants::SPREAD).powi(2)) / own;
-    let pixel = T::from_f64(f64::from(constants::PIXEL).powi(2));
+    let spread = T::from_f64(f64::from(kernel::SPREAD).powi(2)) / own;
+    let pixel = T::from_f64(f64::from(kernel::PIXEL).powi(2));
     let (xx, xy, yy) = (e * spread + pixel, b * spread, a * spread + pixel);
     let det = spread * spread * own + spread * (a + e) * pixel + pixel * pixel;
     let thin = facing / facing.max(least);
-    let weight = (area / det).sqrt() * T::from_f64(3.0 * thin * f64::from(constants::PER_DISK));
-    let range = T::from_f64(f64::from(constants::SAME_SURFACE * c.radius)) / size.sqrt();
+    let weight = (area / det).sqrt() * T::from_f64(3.0 * thin * f64::from(kernel::PER_DISK));
+    let range = T::from_f64(f64::from(kernel::SAME_SURFACE_RADII * c.radius)) / size.sqrt();
     let depth = lambda * length;
     [middle[0], middle[1], yy / det, xy / det, xx / det, xx.sqrt(), yy.sqrt(), weight, range, depth]
         .map(Scalar::to_f64)

@@ -6,13 +6,12 @@ use super::super::records::{CHUNK, Frame, LAYOUT, Row};
 use super::super::scene::{packed_half, packed_normal};
 use super::super::shaders;
 use super::{device, run};
-use crate::backend::cpu::splat::projection as constants;
 use crate::camera::RayScale;
 use crate::camera::three_ray::multiplicity::Jacobian;
 use crate::camera::three_ray::tests::Numbers;
 use crate::camera::three_ray::{Rays, ThreeRay, project};
 use crate::geometry::lanes::{Real, Scalar};
-use crate::plan::SplatShape;
+use crate::plan::{SplatShape, kernel};
 
 /// What the GPU's error may be, over f32's or its precision, whichever is larger.
 const TIMES: f64 = 4.0;
@@ -343,5 +342,5 @@ fn layouts_are_those_of_the_shaders() {
         assert_eq!((*name, *offset as usize), (own, at));
     }
     assert_eq!(CHUNK, 64, "the workgroups' size");
-    assert!(text.contains(&format!("const SPREAD: f32 = {:?}f;", constants::SPREAD)));
+    assert!(text.contains(&format!("const SPREAD: f32 = {:?}f;", kernel::SPREAD)));
 }

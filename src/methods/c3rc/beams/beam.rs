@@ -191,6 +191,12 @@ impl Beam {
         [px[0] as f32 + 0.5 + x, px[1] as f32 + 0.5 + y]
     }
 
+    /// λ of the ray of a pixel at s: its direction is about as long as the first one's.
+    pub(super) fn lambda(&self, lane: usize, s: f32) -> f32 {
+        let [a, b] = [0, 1].map(|k| self.slope[k][lane]);
+        (s - self.begin[lane]) * (1.0 + a * a + b * b).sqrt() / self.length
+    }
+
     /// Its frame in a cloud's space.
     #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
     pub(super) fn frame(&self, place: &Place) -> Frame {

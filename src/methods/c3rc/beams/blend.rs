@@ -1,7 +1,7 @@
 //! A beam's splats to its pixels, from the nearest on; a lane is a pixel.
 
 use fearless_simd::{Simd, f32x16};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::beam::{Beam, LANES};
 use super::close::Layer;
@@ -18,6 +18,7 @@ pub(super) struct Blended {
     pub(super) color: [[f32; LANES]; 3],
     pub(super) shown: [f32; LANES],
     pub(super) full: [f32; LANES],
+    /// From where its ray starts to its nearest splat; 0 if there is none.
     pub(super) near: [f32; LANES],
     pub(super) front: [f32; LANES],
     /// Index of the nearest that shows an object; bits.
@@ -28,10 +29,10 @@ pub(super) struct Blended {
 }
 
 impl Blended {
-    /// Of a pixel, times its coverage.
-    pub(super) fn radiance(&self, lane: usize) -> Vec3 {
+    /// Of a pixel: radiance times coverage, coverage.
+    pub(super) fn value(&self, lane: usize) -> Vec4 {
         let [r, g, b] = &self.color;
-        Vec3::new(r[lane], g[lane], b[lane])
+        Vec4::new(r[lane], g[lane], b[lane], self.shown[lane])
     }
 
     pub(super) fn layer(&self, lane: usize) -> Layer {
@@ -136,6 +137,9 @@ pub(super) fn blend<T: Simd>(
         shown = shown * scale;
         full = now;
     }
+    // From where each pixel's ray starts; 0 where nothing is.
+    let something = own & zero.lt(full);
+    let near = F::<T>::select(something, (near - begin).max(zero.splat(f32::MIN_POSITIVE)), zero);
     Blended {
         color: [out(color[0]), out(color[1]), out(color[2])],
         shown: out(shown),

@@ -1,8 +1,10 @@
 //! Gaps of a surface between pixels that show it are closed. Twin of `shaders/passes/close.wgsl`, over the whole picture.
 
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 
+use crate::camera::eye::ImageSize;
 use crate::plan::kernel::{CLOSING, CLOSING_TWO, SAME_SURFACE_SHARE, SLOPE, SURROUNDED, WHOLE};
+use crate::visibility::mirror_rays::{AREA, TILE, TILE_PX};
 
 /// What a pixel is filled with. All zero: it shows no mirror, counts as full and shows nothing.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,56 +32,60 @@ impl Layer {
     }
 }
 
-/// A picture's pixels, before gaps are closed.
-#[derive(Clone, Copy)]
-pub(super) struct Pixels<'a> {
-    pub(super) width: usize,
-    pub(super) radiance: &'a [Vec3],
-    pub(super) coverage: &'a [f32],
-    pub(super) layers: &'a [Layer],
+/// The pixels of a tile that may show something, by row: radiance times coverage, coverage; and what they are filled with.
+pub(super) struct Tile {
+    pub(super) value: [Vec4; AREA],
+    pub(super) layer: [Layer; AREA],
 }
 
-impl Pixels<'_> {
-    fn layer(&self, at: Option<usize>) -> Layer {
-        at.map_or(Layer::default(), |at| self.layers[at])
+/// A picture, before gaps are closed: its tiles by row. In one that is not there nothing is seen.
+#[derive(Clone, Copy)]
+pub(super) struct Picture<'a> {
+    pub(super) size: ImageSize,
+    pub(super) tiles: &'a [Option<Box<Tile>>],
+}
+
+/// A pixel's column and row.
+pub(super) type Place = [usize; 2];
+
+impl Picture<'_> {
+    /// Tiles in a row.
+    pub(super) fn across(size: ImageSize) -> usize {
+        size.width.div_ceil(TILE_PX) as usize
     }
 
-    fn value(&self, at: Option<usize>) -> Vec4 {
-        let Some(at) = at else { return Vec4::ZERO };
-        // Where nothing landed the radiance is whatever it was.
-        if self.coverage[at] > 0.0 {
-            self.radiance[at].extend(self.coverage[at])
-        } else {
-            Vec4::ZERO
-        }
+    fn get(&self, place: Option<Place>) -> (Layer, Vec4) {
+        let nothing = (Layer::default(), Vec4::ZERO);
+        let Some([x, y]) = place else { return nothing };
+        let Some(tile) = &self.tiles[y / TILE * Self::across(self.size) + x / TILE] else {
+            return nothing;
+        };
+        let at = y % TILE * TILE + x % TILE;
+        (tile.layer[at], tile.value[at])
     }
 
     /// The pixel so many columns or rows on.
-    fn beside(&self, at: usize, steps: isize, along_row: bool) -> Option<usize> {
+    fn beside(&self, [x, y]: Place, steps: isize, along_row: bool) -> Option<Place> {
+        let (width, height) = (self.size.width as usize, self.size.height as usize);
         if along_row {
-            let x = (at % self.width).checked_add_signed(steps).filter(|x| *x < self.width)?;
-            Some(at - at % self.width + x)
+            x.checked_add_signed(steps).filter(|x| *x < width).map(|x| [x, y])
         } else {
-            let to = at.checked_add_signed(steps * self.width.cast_signed())?;
-            (to < self.layers.len()).then_some(to)
+            y.checked_add_signed(steps).filter(|y| *y < height).map(|y| [x, y])
         }
     }
 
     /// The mean of what lies around a pixel, if that is one surface with what landed first there: a gap larger than a pixel
     /// between splats.
-    fn surrounding(&self, at: usize) -> Option<Vec4> {
-        let near = self.layers[at].near;
+    fn surrounding(&self, place: Place, near: f32) -> Option<Vec4> {
         let (mut sum, mut own) = (Vec4::ZERO, 0.0);
         for along_row in [true, false] {
             let (mut depths, mut count) = ([near; 2], 0.0);
             for (depth, steps) in depths.iter_mut().zip([-1, 1]) {
-                let n = self.beside(at, steps, along_row);
-                let layer = self.layer(n);
+                let (layer, value) = self.get(self.beside(place, steps, along_row));
                 if layer.covered() < SURROUNDED {
                     return None;
                 }
                 if layer.near > 0.0 {
-                    let value = self.value(n);
                     if value.w < SURROUNDED {
                         return None;
                     }
@@ -97,16 +103,15 @@ impl Pixels<'_> {
         (own >= 3.0).then(|| sum / own)
     }
 
-    /// What a pixel shows once its gaps are closed; `None` where nothing is to be closed.
-    pub(super) fn closed(&self, at: usize) -> Option<Vec4> {
-        let layer = self.layers[at];
-        if self.coverage[at] <= 0.0 || (layer.full() >= WHOLE && layer.front() >= WHOLE) {
-            return None;
+    /// What a pixel shows once its gaps are closed.
+    pub(super) fn closed(&self, place: Place) -> Vec4 {
+        let (layer, mut own) = self.get(Some(place));
+        if own.w <= 0.0 || (layer.full() >= WHOLE && layer.front() >= WHOLE) {
+            return own;
         }
-        let mut own = self.value(Some(at));
         let (full, front, near) = (layer.full(), layer.front(), layer.near);
         if full.min(front) < CLOSING
-            && let Some(mean) = self.surrounding(at)
+            && let Some(mean) = self.surrounding(place, near)
         {
             own = mean;
         }
@@ -116,9 +121,9 @@ impl Pixels<'_> {
             for (a, b, between, share) in
                 [(-1, 1, None, 0.5), (-1, 2, Some(1), 1.0 / 3.0), (-2, 1, Some(-1), 2.0 / 3.0)]
             {
-                let [at_a, at_b] = [a, b].map(|steps| self.beside(at, steps, along_row));
-                let (la, lb) = (self.layer(at_a), self.layer(at_b));
-                let other = between.map(|steps| self.layer(self.beside(at, steps, along_row)));
+                let [(la, va), (lb, vb)] =
+                    [a, b].map(|steps| self.get(self.beside(place, steps, along_row)));
+                let other = between.map(|steps| self.get(self.beside(place, steps, along_row)).0);
                 if other.is_none_or(|o| o.full().min(full) >= CLOSING_TWO) {
                     whole = whole.max(la.full().min(lb.full()));
                 }
@@ -128,7 +133,7 @@ impl Pixels<'_> {
                 let narrow = other.is_none_or(|o| o.covered().min(front) >= CLOSING_TWO);
                 if both > closed && alike && narrow {
                     closed = both;
-                    mean = self.value(at_a).lerp(self.value(at_b), share);
+                    mean = va.lerp(vb, share);
                 }
             }
         }
@@ -138,6 +143,6 @@ impl Pixels<'_> {
         if (CLOSING..WHOLE).contains(&front) {
             own = own.lerp(mean, (closed - front) / (1.0 - front));
         }
-        Some(own)
+        own
     }
 }

@@ -4,6 +4,8 @@ mod beam;
 mod blend;
 mod close;
 mod seen;
+#[cfg(test)]
+mod tests;
 mod walk;
 
 use std::time::Instant;
@@ -14,7 +16,7 @@ use rayon::prelude::*;
 
 use self::beam::{BLOCK, Beam, Place, lanes, seed};
 use self::blend::CONTACT;
-use self::close::{Layer, Pixels};
+use self::close::{Layer, Picture, Tile};
 use self::seen::Seen;
 use self::walk::{Splats, Walk, clouds_met};
 use super::super::FrameInput;
@@ -25,7 +27,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::image::{Planes, Reason};
 use crate::plan::{GatherCounts, GatherKernel, GatherTimes, Reflection};
-use crate::visibility::mirror_rays::{RayField, TILE, TILE_PX};
+use crate::visibility::mirror_rays::{AREA, RayField, TILE, TILE_PX};
 
 pub(super) struct Kernel<'a> {
     pub(super) frame: FrameInput<'a>,
@@ -38,7 +40,6 @@ struct Scratch {
     splats: Splats,
     order: Vec<u64>,
     met: Vec<Met>,
-    shown: Vec<Shown>,
 }
 
 /// A cloud that a beam may meet, from where on its axis.
@@ -56,15 +57,6 @@ struct Shown {
     lambda: f32,
     /// Where it is seen.
     splat: [f32; 2],
-}
-
-/// A tile's rows of the picture.
-struct Band<'a> {
-    radiance: &'a mut [Vec3],
-    coverage: &'a mut [f32],
-    layers: &'a mut [Layer],
-    /// Whether it is wanted what each pixel shows.
-    describes: bool,
 }
 
 /// What all beams share.
@@ -87,44 +79,58 @@ impl GatherKernel for Kernel<'_> {
             #[expect(clippy::cast_possible_truncation, reason = "a small number")]
             detail: self.settings.detail as f32,
         };
-        out.radiance.resize(size.pixels(), Vec3::ZERO);
-        out.coverage.resize(size.pixels(), 0.0);
-        out.coverage.fill(0.0);
-        let mut layers = vec![Layer::default(); size.pixels()];
-        let rows = (size.width * TILE_PX) as usize;
         let describes = out.planes.is_some();
-        let bands: Vec<Result<(GatherCounts, Vec<Shown>)>> = out
-            .radiance
-            .par_chunks_mut(rows)
-            .zip(out.coverage.par_chunks_mut(rows))
-            .zip(layers.par_chunks_mut(rows))
-            .enumerate()
-            .map_init(Scratch::new, |scratch, (band, ((radiance, coverage), layers))| {
-                let mut counts = GatherCounts::default();
-                let top = u32::try_from(band).unwrap_or(u32::MAX) * TILE_PX;
-                let mut band = Band { radiance, coverage, layers, describes };
-                for column in 0..size.width.div_ceil(TILE_PX) {
-                    cx.check()?;
-                    let origin = [column * TILE_PX, top];
-                    dispatch!(shared.top.level, simd => self.tile(simd, &shared, origin, scratch, &mut band, &mut counts));
-                }
-                Ok((counts, std::mem::take(&mut scratch.shown)))
+        let across = Picture::across(size);
+        let count = across * size.height.div_ceil(TILE_PX) as usize;
+        let done: Vec<Result<Done>> = (0..count)
+            .into_par_iter()
+            .with_max_len(1)
+            .map_init(Scratch::new, |scratch, tile| {
+                cx.check()?;
+                let at = |i: usize| u32::try_from(i).unwrap_or(u32::MAX) * TILE_PX;
+                let origin = [at(tile % across), at(tile / across)];
+                let work = Work { kernel: self, shared: &shared, origin, describes };
+                Ok(dispatch!(shared.top.level, simd => work.run(simd, scratch)))
             })
             .collect();
         let mut counts = GatherCounts::default();
-        let mut shown = Vec::new();
-        for band in bands {
-            let (more, list) = band?;
+        let (mut tiles, mut shown) = (Vec::with_capacity(count), Vec::new());
+        for done in done {
+            let Done { tile, shown: list, counts: more } = done?;
             counts = counts.plus(more);
+            tiles.push(tile);
             shown.extend(list);
         }
-        self.close(&layers, out);
+        fill_in(Picture { size, tiles: &tiles }, out);
         if let Some(planes) = out.planes.as_deref_mut() {
             planes.coverage.copy_from_slice(&out.coverage);
             self.describe(&shown, planes);
         }
         Ok(GatherTimes { surfels: Some(counts), ..GatherTimes::default() })
     }
+}
+
+/// Closes gaps, and writes the reflection. Where nothing is seen the coverage is 0, and the radiance whatever it was.
+fn fill_in(picture: Picture<'_>, out: &mut Reflection) {
+    let size = picture.size;
+    out.radiance.resize(size.pixels(), Vec3::ZERO);
+    out.coverage.resize(size.pixels(), 0.0);
+    let (width, across) = (size.width as usize, Picture::across(size));
+    let rows = out.radiance.par_chunks_mut(width).zip(out.coverage.par_chunks_mut(width));
+    rows.with_min_len(4).enumerate().for_each(|(y, (radiance, coverage))| {
+        let tiles = &picture.tiles[y / TILE * across..][..across];
+        let pixels = radiance.chunks_mut(TILE).zip(coverage.chunks_mut(TILE));
+        for (i, (tile, (radiance, coverage))) in tiles.iter().zip(pixels).enumerate() {
+            if tile.is_none() {
+                coverage.fill(0.0);
+                continue;
+            }
+            for (column, (radiance, coverage)) in radiance.iter_mut().zip(coverage).enumerate() {
+                let value = picture.closed([i * TILE + column, y]);
+                (*radiance, *coverage) = (value.truncate(), value.w);
+            }
+        }
+    });
 }
 
 impl Scratch {
@@ -134,30 +140,11 @@ impl Scratch {
             splats: Splats::default(),
             order: Vec::new(),
             met: Vec::new(),
-            shown: Vec::new(),
         }
     }
 }
 
 impl Kernel<'_> {
-    /// Closes gaps.
-    fn close(&self, layers: &[Layer], out: &mut Reflection) {
-        let width = self.frame.eye.size.width as usize;
-        let pixels = Pixels { width, radiance: &out.radiance, coverage: &out.coverage, layers };
-        let rows = width * TILE;
-        let closed: Vec<Vec<(usize, Vec4)>> = (0..layers.len().div_ceil(rows))
-            .into_par_iter()
-            .map(|band| {
-                let range = band * rows..((band + 1) * rows).min(layers.len());
-                range.filter_map(|at| Some((at, pixels.closed(at)?))).collect()
-            })
-            .collect();
-        for (at, value) in closed.into_iter().flatten() {
-            out.radiance[at] = value.truncate();
-            out.coverage[at] = value.w;
-        }
-    }
-
     /// Says what was seen.
     fn describe(&self, shown: &[Shown], planes: &mut Planes) {
         let scene = self.frame.scene;
@@ -173,37 +160,57 @@ impl Kernel<'_> {
             planes.splat[pixel] = splat;
             planes.object[pixel] = u32::try_from(cloud).expect("fewer than 2^32 objects");
             planes.surfel[pixel] = surfel;
-            planes.images[pixel] = 1;
             planes.reason[pixel] = Reason::Object as u32;
         }
     }
 }
 
-impl Kernel<'_> {
+/// What one tile comes to.
+struct Done {
+    tile: Option<Box<Tile>>,
+    shown: Vec<Shown>,
+    counts: GatherCounts,
+}
+
+/// The work on one tile.
+struct Work<'a> {
+    kernel: &'a Kernel<'a>,
+    shared: &'a Shared,
+    /// Its first column and row.
+    origin: [u32; 2],
+    /// Whether it is wanted what each pixel shows.
+    describes: bool,
+}
+
+impl Work<'_> {
     #[inline(always)]
-    fn tile<S: Simd>(
-        &self,
-        simd: S,
-        shared: &Shared,
-        origin: [u32; 2],
-        scratch: &mut Scratch,
-        band: &mut Band<'_>,
-        counts: &mut GatherCounts,
-    ) {
-        let FrameInput { scene, eye, visibility } = self.frame;
+    fn run<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> Done {
+        let mut done = Done { tile: None, shown: Vec::new(), counts: GatherCounts::default() };
+        self.tile(simd, scratch, &mut done);
+        done
+    }
+
+    #[inline(always)]
+    fn tile<S: Simd>(&self, simd: S, scratch: &mut Scratch, out: &mut Done) {
+        let FrameInput { scene, eye, visibility } = self.kernel.frame;
+        let (shared, origin) = (self.shared, self.origin);
+        let counts = &mut out.counts;
         let mut watch = Watch::new();
-        let Scratch { field, splats, order, met, shown: seen_here } = scratch;
+        let Scratch { field, splats, order, met } = scratch;
         let shown = field.enter(simd, eye, visibility, origin);
         if shown == [0; TILE] {
             return;
         }
         let top = &shared.top;
-        if sees_nothing(simd, self.frame, top, origin, field, &shown, self.settings) {
+        if sees_nothing(simd, self.kernel.frame, top, origin, field, &shown, self.kernel.settings) {
             counts.cameras_ns += watch.lap();
             return;
         }
         field.fill(eye, scene, &shown);
         let width = eye.size.width as usize;
+        let nothing =
+            || Box::new(Tile { value: [Vec4::ZERO; AREA], layer: [Layer::default(); AREA] });
+        let tile = out.tile.get_or_insert_with(nothing);
         for y in (0..TILE).step_by(BLOCK) {
             for x in (0..TILE).step_by(BLOCK) {
                 let mut left = lanes(&shown, [x, y]);
@@ -218,7 +225,7 @@ impl Kernel<'_> {
                     let mut done = None;
                     if !met.is_empty() {
                         counts.cameras_ns += watch.lap();
-                        self.walk(simd, shared, &beam, met, &mut seen, counts);
+                        self.walk(simd, &beam, met, &mut seen, counts);
                         counts.walk_ns += watch.lap();
                         done = (seen.splats.len > 0).then(|| seen.blend(simd, &beam));
                     }
@@ -227,26 +234,26 @@ impl Kernel<'_> {
                         let lane = pixels.trailing_zeros() as usize;
                         pixels &= pixels - 1;
                         let [row, column] = [y + lane / BLOCK, x + lane % BLOCK];
-                        let at = row * width + origin[0] as usize + column;
+                        let at = row * TILE + column;
                         let Some(done) = &done else {
-                            band.layers[at].open = 1.0;
+                            tile.layer[at].open = 1.0;
                             continue;
                         };
-                        band.layers[at] = done.layer(lane);
-                        if done.shown[lane] > 0.0 {
-                            band.radiance[at] = done.radiance(lane);
-                            band.coverage[at] = done.shown[lane];
-                            if band.describes {
-                                let first = done.first[lane].to_bits() as usize;
-                                let place = seen.splats.place(first);
-                                let from = [origin[0] as usize + column, origin[1] as usize + row];
-                                seen_here.push(Shown {
-                                    pixel: origin[1] as usize * width + at,
-                                    surfel: seen.splats.surfel[first],
-                                    lambda: place[2] / beam.length,
-                                    splat: beam.seen_at(lane, from, place),
-                                });
-                            }
+                        tile.layer[at] = done.layer(lane);
+                        if done.shown[lane] <= 0.0 {
+                            continue;
+                        }
+                        tile.value[at] = done.value(lane);
+                        if self.describes {
+                            let first = done.first[lane].to_bits() as usize;
+                            let place = seen.splats.place(first);
+                            let px = [origin[0] as usize + column, origin[1] as usize + row];
+                            out.shown.push(Shown {
+                                pixel: px[1] * width + px[0],
+                                surfel: seen.splats.surfel[first],
+                                lambda: beam.lambda(lane, place[2]),
+                                splat: beam.seen_at(lane, px, place),
+                            });
                         }
                     }
                     if done.is_some() {
@@ -272,21 +279,21 @@ impl Kernel<'_> {
     fn walk<S: Simd>(
         &self,
         simd: S,
-        shared: &Shared,
         beam: &Beam,
         met: &mut Vec<Met>,
         seen: &mut Seen<'_>,
         counts: &mut GatherCounts,
     ) {
-        let objects = self.frame.scene.objects.len();
+        let (scene, shared) = (self.kernel.frame.scene, self.shared);
+        let objects = scene.objects.len();
         let first = beam.first - CONTACT * beam.length;
         for met in met.iter() {
             if met.near > seen.full_from {
                 break;
             }
-            self.walk_cloud(simd, shared, beam, met.cloud, [first, f32::MAX], seen, counts);
+            self.walk_cloud(simd, beam, met.cloud, [first, f32::MAX], seen, counts);
         }
-        if !self.settings.mirror_occlusion || seen.splats.len == 0 {
+        if !self.kernel.settings.mirror_occlusion || seen.splats.len == 0 {
             return;
         }
         met.clear();
@@ -296,7 +303,7 @@ impl Kernel<'_> {
             let reaches = &top.reaches[top.objects.len()..];
             add_met(simd, beam, &top.mirrors, reaches, range, objects, met);
             for met in met.iter() {
-                self.walk_cloud(simd, shared, beam, met.cloud, range, seen, counts);
+                self.walk_cloud(simd, beam, met.cloud, range, seen, counts);
             }
         }
     }
@@ -306,14 +313,13 @@ impl Kernel<'_> {
     fn walk_cloud<S: Simd>(
         &self,
         simd: S,
-        shared: &Shared,
         beam: &Beam,
         cloud: usize,
         [first, last]: [f32; 2],
         seen: &mut Seen<'_>,
         counts: &mut GatherCounts,
     ) {
-        let scene = self.frame.scene;
+        let (scene, shared) = (self.kernel.frame.scene, self.shared);
         let hides = cloud >= scene.objects.len();
         let frame = beam.frame(&shared.places[cloud]);
         let cloud = &scene.clouds[cloud];

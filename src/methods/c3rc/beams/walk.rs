@@ -61,6 +61,25 @@ impl Splats {
         [self.value[U][i], self.value[V][i], self.value[S][i]]
     }
 
+    /// Adds one at u, v, s, as tests have them.
+    #[cfg(test)]
+    pub(super) fn push(
+        &mut self,
+        place: [f32; 3],
+        surfel: u32,
+        fill: impl FnOnce(&mut [f32; VALUES]),
+    ) {
+        self.reserve(1);
+        let mut value = [0.0; VALUES];
+        [value[U], value[V], value[S]] = place;
+        fill(&mut value);
+        for (list, value) in self.value.iter_mut().zip(value) {
+            list[self.len] = value;
+        }
+        self.surfel[self.len] = surfel;
+        self.len += 1;
+    }
+
     fn reserve(&mut self, more: usize) {
         let room = self.len + more;
         if self.surfel.len() < room {
@@ -224,6 +243,26 @@ impl Walk<'_> {
         }
         if seen.splats.near.len > 0 {
             self.take(simd, &bounds, &mut seen.splats, counts);
+        }
+    }
+
+    /// Looks at every surfel, as a test of the tree.
+    #[cfg(test)]
+    #[inline(always)]
+    pub(super) fn look_at_all<T: Simd>(
+        &mut self,
+        simd: T,
+        seen: &mut Seen<'_>,
+        counts: &mut GatherCounts,
+    ) {
+        let bounds = self.bounds();
+        let range = self.cloud.surfels.clone();
+        for first in range.clone().step_by(CHILDREN) {
+            let some = (range.end - first).min(WIDTH);
+            self.look(simd, &bounds, first, (1 << some) - 1, 1, seen, counts);
+        }
+        if seen.splats.near.len > 0 {
+            self.take(simd, &bounds, seen.splats, counts);
         }
     }
 
