@@ -1,0 +1,291 @@
+//! Blocks against what they stand for: exact rays, every surfel, layers in order.
+
+use fearless_simd::dispatch;
+use glam::{DVec3, Vec2, Vec3, Vec4};
+
+use super::super::cameras::Top;
+use super::beam::{BLOCK, Beam, LANES, Place, lanes, seed};
+use super::blend::blend;
+use super::close::{self, Layer, Tile};
+use super::seen::Seen;
+use super::walk::{DEPTH, FORM, PER_HALF, RANGE, SMALL, Splats, WEIGHT, Walk};
+use crate::camera::Eye;
+use crate::camera::eye::ImageSize;
+use crate::camera::mirror_ray::{RayScale, RaySource, reflected_ray};
+use crate::context::Context;
+use crate::error::Error;
+use crate::frame::Renderer;
+use crate::geometry::lanes::simd_level;
+use crate::methods::{FrameInput, Method, Params, c3rc::C3rc};
+use crate::plan::kernel::GAIN;
+use crate::plan::{GatherCounts, Pass, Plan, Reflection};
+use crate::scene::description::{Environment, EyeDescription};
+use crate::scene::{GivenSurfels, PreparedScene, builtin};
+use crate::visibility::mirror_rays::{AREA, RayField, TILE, TILE_PX};
+
+const SIZE: ImageSize = ImageSize { width: 160, height: 120 };
+
+/// A mirror over a floor of surfels, which it partly hides from itself.
+fn scene(mirror: &str) -> (PreparedScene, Eye) {
+    let at =
+        |i: u16| Vec3::new(f32::from(i % 150) * 0.04 - 3.0, -0.9, f32::from(i / 150) * 0.04 - 3.0);
+    let floor: Vec<Vec3> = (0..22_500).map(at).collect();
+    let (normals, radiance) = (vec![Vec3::Y; floor.len()], vec![Vec3::X; floor.len()]);
+    let given = GivenSurfels { positions: &floor, normals: &normals, radiance: &radiance };
+    let eye = EyeDescription {
+        position: DVec3::new(0.3, 1.1, 3.0),
+        target: DVec3::ZERO,
+        up: DVec3::Y,
+        fov_y: 0.7,
+    };
+    let mirror = builtin::shape(mirror, Some(1000)).unwrap();
+    let sky = Environment::Constant(Vec3::ONE);
+    let scene = PreparedScene::from_surfels(mirror, given, eye, sky).unwrap();
+    let eye = scene.eye_for(SIZE).unwrap();
+    (scene, eye)
+}
+
+/// Calls `f` with all beams of a view, the corner of their block in the picture, and the pixels that were left.
+fn beams(scene: &PreparedScene, eye: &Eye, mut f: impl FnMut(&Beam, [usize; 2], u32)) {
+    let mut renderer = Renderer::new();
+    renderer.see(scene, eye);
+    let mut field = RayField::new();
+    let tile = TILE_PX as usize;
+    for top in (0..SIZE.height).step_by(tile) {
+        for left in (0..SIZE.width).step_by(tile) {
+            let origin = [left, top];
+            let shown = dispatch!(simd_level(), simd => field.enter(simd, eye, renderer.visibility(), origin));
+            field.fill(eye, scene, &shown);
+            for y in (0..TILE).step_by(BLOCK) {
+                for x in (0..TILE).step_by(BLOCK) {
+                    let mut open = lanes(&shown, [x, y]);
+                    while open != 0 {
+                        let first = seed(open);
+                        let at = [x + first % BLOCK, y + first / BLOCK];
+                        let tangent = field.tangent(eye, scene, at);
+                        let beam = dispatch!(simd_level(), simd => Beam::new(simd, eye, &field, &tangent, [x, y], first, open));
+                        f(&beam, [left as usize + x, top as usize + y], open);
+                        open &= !beam.pixels;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// How far, in shares of the distance, a beam's rays are from those of the pixels that `moved` away.
+fn farthest_off(mirror: &str, moved: f32) -> (f32, usize) {
+    let (scene, eye) = scene(mirror);
+    let mut renderer = Renderer::new();
+    renderer.see(&scene, &eye);
+    let (mut most, mut rays) = (0.0f32, 0);
+    beams(&scene, &eye, |beam, [left, top], open| {
+        assert_ne!(beam.pixels, 0, "a beam has its first pixel");
+        assert_eq!(beam.pixels & !open, 0, "no pixel is in two beams");
+        for lane in (0..LANES).filter(|lane| beam.pixels >> lane & 1 != 0) {
+            let [x, y] = [left + lane % BLOCK, top + lane / BLOCK];
+            let id = renderer.visibility().mirror_ids[y * SIZE.width as usize + x];
+            let px = Vec2::new(x as f32 + 0.5 + moved, y as f32 + 0.5);
+            let triangle = scene.mirror_triangle(id);
+            let (source, scale) = (RaySource::Surface, RayScale::EyeDistance);
+            let (from, along) = reflected_ray(&eye, px, &triangle, source, scale).unwrap();
+            let [u, v, a] = beam.axes;
+            let begin = a.dot(from - beam.origin);
+            assert!((begin - beam.begin[lane]).abs() < 1e-3 || moved != 0.0);
+            for s in [0.5f32, 4.0] {
+                let [bu, bv] = [0, 1].map(|k| beam.start[k][lane] + s * beam.slope[k][lane]);
+                let place = beam.origin + u * bu + v * bv + a * s;
+                let off = (place - from).reject_from(along).length();
+                most = most.max(off / (place - from).length());
+                rays += 1;
+            }
+        }
+    });
+    (most, rays)
+}
+
+#[test]
+fn every_pixel_has_its_exact_ray() {
+    for mirror in ["sphere", "teapot", "bowl", "wave"] {
+        let (off, rays) = farthest_off(mirror, 0.0);
+        assert!(rays > 2000 && off < 1e-4, "{mirror}: {off} off in {rays}");
+        let (off, _) = farthest_off(mirror, 0.5);
+        assert!(off > 1e-3, "{mirror}: half a pixel is to be seen, not {off}");
+    }
+}
+
+/// The surfels of the floor that a beam finds by its tree, or by looking at all.
+fn found(scene: &PreparedScene, beam: &Beam, by_tree: bool) -> Vec<u32> {
+    let (mut splats, mut order) = (Splats::default(), Vec::new());
+    let mut seen = Seen::new(&mut splats, &mut order, scene, 0.1);
+    // So that nothing is left out for being hidden.
+    seen.until = usize::MAX;
+    let cloud = &scene.clouds[0];
+    let mut walk = Walk {
+        beam,
+        frame: beam.frame(&Place::new(&cloud.to_scene)),
+        cloud,
+        surfels: &scene.surfels,
+        range: [beam.first, f32::MAX],
+        detail: 0.0,
+        front_only: false,
+    };
+    let mut counts = GatherCounts::default();
+    dispatch!(simd_level(), simd => match by_tree {
+        true => walk.run(simd, &mut seen, &mut counts),
+        false => walk.look_at_all(simd, &mut seen, &mut counts),
+    });
+    let mut list = seen.splats.surfel[..seen.splats.len].to_vec();
+    list.sort_unstable();
+    list
+}
+
+#[test]
+fn the_tree_leaves_out_nothing_that_is_seen() {
+    let (mut beams_that_see, mut all) = (0, 0);
+    for mirror in ["sphere", "teapot", "bowl"] {
+        let (scene, eye) = scene(mirror);
+        let mut n = 0;
+        beams(&scene, &eye, |beam, _, _| {
+            n += 1;
+            if n % 7 == 0 {
+                let wanted = found(&scene, beam, false);
+                assert_eq!(found(&scene, beam, true), wanted, "{mirror}, beam {n}");
+                beams_that_see += usize::from(!wanted.is_empty());
+                all += wanted.len();
+            }
+        });
+    }
+    assert!(beams_that_see > 100 && all > 2000, "{beams_that_see} beams, {all} surfels");
+}
+
+/// A beam of parallel rays a unit apart, and round splats in it: u, v, radius, weight in the middle, depth.
+fn drawn(list: &[[f32; 5]], first_hider: u32) -> super::blend::Blended {
+    const COLORS: [Vec3; 4] = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
+    let (scene, eye) = scene("plane");
+    let mut beam = None;
+    beams(&scene, &eye, |b, _, _| beam = Some(b.clone()));
+    let mut beam = beam.unwrap();
+    beam.pixels = 0xffff;
+    for lane in 0..LANES {
+        beam.start[0][lane] = (lane % BLOCK) as f32;
+        beam.start[1][lane] = (lane / BLOCK) as f32;
+        (beam.slope[0][lane], beam.slope[1][lane], beam.begin[lane]) = (0.0, 0.0, 0.0);
+    }
+    let mut splats = Splats::default();
+    let mut order = Vec::new();
+    for (i, &[u, v, radius, weight, depth]) in list.iter().enumerate() {
+        let form = 1.0 / (radius * radius);
+        splats.push([u, v, depth], u32::try_from(i).unwrap(), |value| {
+            (value[DEPTH], value[WEIGHT], value[RANGE], value[SMALL]) = (depth, weight, 0.5, 1.0);
+            (value[FORM], value[FORM + 1], value[FORM + 2]) = (form, 0.0, form);
+            (value[PER_HALF], value[PER_HALF + 1]) = (1.0 / radius, 1.0 / radius);
+        });
+        order.push(u64::from(depth.to_bits()) << 32 | i as u64);
+    }
+    order.sort_unstable();
+    dispatch!(simd_level(), simd => blend(simd, &beam, &splats, &order, &COLORS, first_hider, 0.1))
+}
+
+#[test]
+fn the_nearest_fill_a_pixel_and_the_rest_shows_through() {
+    let parts = [
+        [1.0, 1.0, 0.4, 9.0, 3.0],
+        [1.0, 1.0, 0.4, 0.25 / GAIN, 1.0],
+        [1.0, 1.0, 0.4, 0.5 / GAIN, 2.0],
+    ];
+    let lane = BLOCK + 1;
+    let is = |list: &[[f32; 5]], hider: u32, color: [f32; 3], shown: f32| {
+        let done = drawn(list, hider);
+        let off = (done.value(lane).truncate() - Vec3::from_array(color)).abs().max_element();
+        assert!(off < 1e-6 && (done.shown[lane] - shown).abs() < 1e-6, "{done:?}");
+        assert!((0..LANES).all(|l| l == lane || done.full[l] == 0.0), "its neighbours are empty");
+        done
+    };
+    let done = is(&parts, 9, [0.25, 0.25, 0.5], 1.0);
+    assert_eq!(done.first[lane].to_bits(), 1, "the nearest");
+    is(&parts[1..2], 9, [0.25, 0.0, 0.0], 0.25);
+    // The last two are a mirror's: they hide and show nothing.
+    is(&parts, 1, [0.25, 0.0, 0.0], 0.25);
+    // A mirror hides nothing nearer than its clearance.
+    is(&[[1.0, 1.0, 0.4, 9.0, 3.0], [1.0, 1.0, 0.4, 9.0, 0.05]], 1, [1.0, 0.0, 0.0], 1.0);
+    // Where the front is full, that is known, and up to where.
+    let done = drawn(&[[1.5, 1.5, 99.0, 9.0, 2.0], [1.0, 1.0, 0.4, 9.0, 3.0]], 9);
+    assert_eq!((done.used, done.full_from), (1, 2.0));
+}
+
+#[test]
+fn gaps_are_closed_and_edges_stay() {
+    let size = ImageSize { width: 2 * TILE_PX, height: 1 };
+    let tile = |coverage: &[f32]| {
+        let mut tile = Tile { value: [Vec4::ZERO; AREA], layer: [Layer::default(); AREA] };
+        for (i, &full) in coverage.iter().enumerate() {
+            tile.value[i] = Vec4::new(full, 0.0, 0.0, full);
+            let near = if full > 0.0 { 1.0 } else { 0.0 };
+            tile.layer[i] = Layer { open: 1.0 - full, near, behind: 0.0 };
+        }
+        Some(Box::new(tile))
+    };
+    let mut first = [0.0; TILE];
+    first[..5].copy_from_slice(&[1.0, 0.5, 1.0, 0.5, 0.0]);
+    // A gap on a tile's last column, and the picture's end.
+    (first[TILE - 2], first[TILE - 1]) = (1.0, 0.5);
+    let mut second = [0.0; TILE];
+    (second[0], second[TILE - 1]) = (1.0, 0.5);
+    let tiles = [tile(&first), tile(&second)];
+    let picture = close::Picture { size, tiles: &tiles };
+    let near =
+        |x: usize, w: f32| (picture.closed([x, 0]) - Vec4::new(w, 0.0, 0.0, w)).length() < 1e-6;
+    assert!(near(1, 1.0), "a gap: {}", picture.closed([1, 0]));
+    assert!(near(3, 0.5), "an edge: {}", picture.closed([3, 0]));
+    assert!(near(0, 1.0) && near(4, 0.0), "full and empty ones stay");
+    assert!(near(TILE - 1, 1.0), "between two tiles");
+    assert!(near(2 * TILE - 1, 0.5), "at the picture's end");
+}
+
+#[test]
+fn blocks_are_drawn_where_they_can_be() {
+    let (scene, eye) = scene("sphere");
+    let mut renderer = Renderer::new();
+    renderer.see(&scene, &eye);
+    let frame = FrameInput { scene: &scene, eye: &eye, visibility: renderer.visibility() };
+    for (settings, gathers, blocks) in [
+        (&[][..], true, true),
+        (&[], false, false),
+        (&[("splat", "square2")], true, false),
+        (&[("test", "sweep")], true, false),
+        (&[("depth", "push-back")], true, false),
+        (&[("roots", "first")], true, false),
+        (&[("cameras", "cells")], true, false),
+    ] {
+        let mut params = Params::defaults(C3rc.info().params);
+        for (name, value) in settings {
+            params.set(C3rc.info().param(name), value).unwrap();
+        }
+        let mut plan = Plan { gathers, ..Plan::default() };
+        let made: crate::methods::Made = std::sync::Arc::new(());
+        C3rc.plan(frame, &made, &params, &mut plan).unwrap();
+        assert_eq!(matches!(plan.passes[0], Pass::Gather(_)), blocks, "{settings:?}");
+    }
+    // They stop when they are to.
+    let cancel = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true));
+    let settings = super::CameraSettings {
+        ray_scale: RayScale::EyeDistance,
+        shape: crate::plan::SplatShape::Ellipse,
+        detail: 2.0,
+        mirror_occlusion: true,
+    };
+    let kernel = super::Kernel { frame, settings };
+    let gather = |cx: &Context| {
+        let mut out = Reflection::default();
+        crate::plan::GatherKernel::gather(&kernel, &mut out, cx).map(|done| (done, out))
+    };
+    assert!(matches!(gather(&Context::cancelled_by(cancel)), Err(Error::Cancelled)));
+    let (done, out) = gather(&Context::default()).unwrap();
+    let counts = done.surfels.unwrap();
+    assert!(counts.valid > 1000 && counts.valid <= counts.projections, "{counts:?}");
+    let covered = out.coverage.iter().filter(|c| **c > 0.5).count();
+    assert!(covered > 500, "{covered} pixels show the floor");
+    // A tile may be left out only where nothing is seen.
+    assert!(!Top::new(&scene, &eye).reaches.is_empty());
+}
