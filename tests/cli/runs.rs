@@ -177,10 +177,13 @@ fn odd_views_give_pictures() {
 #[test]
 fn figures_of_a_frame() {
     let folder = Folder::new();
-    for (method, unmeasured) in
-        [("c3rc", vec!["rays"]), ("raytrace", vec!["cameras", "cull", "project", "splat", "layer"])]
-    {
-        let line = format!("render default --method {method} {SMALL} -o a.png --json a.json");
+    for (method, flags, unmeasured) in [
+        ("c3rc", "", vec!["project", "rays"]),
+        ("c3rc", "--cameras cells", vec!["rays"]),
+        ("raytrace", "", vec!["cameras", "cull", "project", "splat", "layer"]),
+    ] {
+        let line =
+            format!("render default --method {method} {flags} {SMALL} -o a.png --json a.json");
         for repeat in ["", "--repeat 3"] {
             let run = folder.good(&format!("{line} {repeat}"));
             let figures = folder.json("a.json");

@@ -67,9 +67,10 @@ const fn way(
     Way { method, settings, splat, cameras }
 }
 
-const WAYS: [Way; 12] = [
+const WAYS: [Way; 13] = [
     way("c3rc", &[], Splat::Disk, false),
-    way("c3rc", &[("detail", "4")], Splat::Disk, false),
+    way("c3rc", &[("cameras", "cells")], Splat::Disk, false),
+    way("c3rc", &[("cameras", "cells"), ("detail", "4")], Splat::Disk, false),
     way(
         "c3rc",
         &[("cameras", "triangles"), ("splat", "square2"), ("detail", "1")],

@@ -17,7 +17,7 @@ use crate::context::Context;
 use crate::frame::Renderer;
 use crate::geometry::{Mesh, Similarity};
 use crate::image::Picture;
-use crate::methods::{FrameInput, Params, method};
+use crate::methods::{FrameInput, Method, Params, method};
 use crate::plan::{Plan, Reflection};
 use crate::scene::description::{
     Environment, EyeDescription, Light, Mirror, Object, Paint, PatternKind, Scene,
@@ -138,13 +138,20 @@ pub(super) fn picture(
         renderer.keep_bright();
     }
     let c3rc = method("c3rc").expect("it is there");
-    let params = Params::defaults(c3rc.info().params);
+    let params = of_cells(c3rc);
     let eye = scene.eye_for(SIZE).expect("a view");
     renderer
         .render(scene, &eye, c3rc, &params, true, &Context::default())
         .unwrap_or_else(|e| panic!("{e}"));
     let planes = renderer.planes().expect("they were asked for");
     (renderer.picture().clone(), planes.radiance.clone())
+}
+
+/// The defaults, but for what devices draw instead of blocks.
+pub(super) fn of_cells(c3rc: &dyn Method) -> Params {
+    let mut params = Params::defaults(c3rc.info().params);
+    params.set(c3rc.info().param("cameras"), "cells").expect("it has this value");
+    params
 }
 
 pub(super) fn gpu() -> Box<Gpu> {
@@ -209,7 +216,7 @@ fn frames_on_a_given_device_make_no_buffers() {
     visibility.update(&eye, &mirrors, &objects, &mut Scratch::default());
     let frame = FrameInput { scene: &scene, eye: &eye, visibility: &visibility };
     let (c3rc, mut plan) = (method("c3rc").expect("it is there"), Plan::default());
-    let params = Params::defaults(c3rc.info().params);
+    let params = of_cells(c3rc);
     let made = c3rc.prepare(&scene, &params, &Context::default()).expect("no one cancels");
     c3rc.plan(frame, &made, &params, &mut plan).expect("it can draw it");
     let (mut out, mut picture) = (Reflection::default(), Picture::black(0, 0));
@@ -232,7 +239,7 @@ fn moved_things_and_scenes_without_triangles() {
     let mut scene = scene(SKY);
     let mut renderer = Renderer::on(gpu());
     let c3rc = method("c3rc").expect("it is there");
-    let params = Params::defaults(c3rc.info().params);
+    let params = of_cells(c3rc);
     let eye = scene.eye_for(SIZE).expect("a view");
     let to = |x, y, z, scale| Similarity {
         translation: DVec3::new(x, y, z),

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::super::environment::Panorama;
 use super::super::records::Row;
 use super::super::shaders;
-use super::looks::{gpu, picture, scene, verdict};
+use super::looks::{gpu, of_cells, picture, scene, verdict};
 use super::pictures::SIZE;
 use super::{device, run_with};
 use crate::backend::cpu::Cpu;
@@ -16,7 +16,7 @@ use crate::camera::three_ray::tests::Numbers;
 use crate::context::Context;
 use crate::frame::Renderer;
 use crate::image::Picture;
-use crate::methods::{Params, method};
+use crate::methods::method;
 use crate::scene::description::Environment;
 use crate::scene::environment::image::{EnvironmentImage, Mounting};
 
@@ -154,7 +154,7 @@ fn pictures_are_the_cpus_also_when_the_environment_changes() {
     let mut renderer = Renderer::on(gpu());
     renderer.keep_bright();
     let c3rc = method("c3rc").expect("it is there");
-    let params = Params::defaults(c3rc.info().params);
+    let params = of_cells(c3rc);
     let mut scene = scene(all[0].clone());
     let eye = scene.eye_for(SIZE).expect("a view");
     let mut last: Option<Picture> = None;

@@ -212,7 +212,7 @@ fn what_every_webgpu_has_is_enough() {
     }
     let scene = scene("sphere");
     for splat in ["square1", "square2", "ellipse"] {
-        let words = [("splat", splat)];
+        let words = [("splat", splat), ("cameras", "cells")];
         let cpu = shown(Box::new(Cpu::default()), &scene, &words);
         for path in [Path::Vertex, Path::Compute] {
             let found = shown(gpu(path, Limits::Core), &scene, &words);

@@ -1,7 +1,7 @@
 //! A beam: the rays of some pixels of a block, each exactly, and what bounds them.
 
 use fearless_simd::{Simd, f32x16};
-use glam::{DMat3, DVec3, Mat3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Mat3, Vec3};
 
 use crate::camera::Eye;
 use crate::geometry::Similarity;
@@ -28,6 +28,8 @@ pub(super) struct Beam {
     /// Where the first ray starts, and the axes; scene space.
     pub(super) origin: Vec3,
     pub(super) axes: [Vec3; 3],
+    /// The mirror triangle of the first ray.
+    pub(super) triangle: u32,
     /// Bit i: pixel i of the block is the beam's.
     pub(super) pixels: u32,
     /// By axis and pixel.
@@ -103,6 +105,7 @@ impl Beam {
         let mut beam = Self {
             origin,
             axes,
+            triangle: field.ids[at[1] * TILE + at[0]],
             pixels: 0,
             start: [[0.0; LANES]; 2],
             slope: [[0.0; LANES]; 2],
@@ -177,24 +180,9 @@ impl Beam {
         beam
     }
 
-    /// Where in the picture a place (u, v, s) near the ray of a pixel, the one at `px`, is seen. That pixel's middle where neighbours'
-    /// rays do not tell.
-    pub(super) fn seen_at(&self, lane: usize, px: [usize; 2], [u, v, s]: [f32; 3]) -> [f32; 2] {
-        let off = [u, v];
-        let [du, dv] = [0, 1].map(|k| off[k] - self.start[k][lane] - s * self.slope[k][lane]);
-        let step = |k: usize, i: usize| self.step[k][i] + s * self.step_per_s[k][i];
-        let (a, b, c, d) = (step(0, 0), step(0, 1), step(1, 0), step(1, 1));
-        let det = a * d - b * c;
-        let moved = [(d * du - b * dv) / det, (a * dv - c * du) / det];
-        // A splat does not reach farther.
-        let [x, y] = moved.map(|m| if m.abs() <= LARGEST_ELLIPSE { m } else { 0.0 });
-        [px[0] as f32 + 0.5 + x, px[1] as f32 + 0.5 + y]
-    }
-
-    /// λ of the ray of a pixel at s: its direction is about as long as the first one's.
-    pub(super) fn lambda(&self, lane: usize, s: f32) -> f32 {
-        let [a, b] = [0, 1].map(|k| self.slope[k][lane]);
-        (s - self.begin[lane]) * (1.0 + a * a + b * b).sqrt() / self.length
+    /// The scene's place at u, v, s.
+    pub(super) fn place(&self, [u, v, s]: [f32; 3]) -> Vec3 {
+        self.origin + self.axes[0] * u + self.axes[1] * v + self.axes[2] * s
     }
 
     /// Its frame in a cloud's space.
@@ -208,6 +196,48 @@ impl Beam {
         }
     }
 }
+
+/// How far from the middle of a pixel (column and row of its tile) a place is seen, in pixels, and its λ there. `tangent`: of that
+/// pixel. `None` if it is not seen near it.
+pub(super) fn image_near(
+    eye: &Eye,
+    field: &RayField,
+    tangent: &Linear<4>,
+    px: [usize; 2],
+    place: Vec3,
+) -> Option<(DVec2, f64)> {
+    let of = |l: &[f32; 4]| DVec3::new(l[0].into(), l[1].into(), l[2].into());
+    let place = place.as_dvec3() - eye.position.as_dvec3();
+    let view = field.view_at(px).as_dvec3();
+    let [view_right, view_down] = field.view_steps().map(|v| v.as_dvec3());
+    let [f0, f1, f2, q] = field.at(px);
+    let (f, q) = (DVec3::new(f0.into(), f1.into(), f2.into()), f64::from(q));
+    let (right, down) = (of(&tangent.right), of(&tangent.down));
+    let (q_right, q_down) = (f64::from(tangent.right[3]), f64::from(tangent.down[3]));
+    // q place = view + λ f, all linear over the picture.
+    let mut off = DVec2::ZERO;
+    let mut lambda = f.dot(place * q - view) / f.length_squared();
+    for _ in 0..IMAGE_STEPS {
+        let ray = f + right * off.x + down * off.y;
+        let rest = place * (q + q_right * off.x + q_down * off.y)
+            - (view + view_right * off.x + view_down * off.y)
+            - ray * lambda;
+        let slopes = DMat3::from_cols(
+            place * q_right - view_right - right * lambda,
+            place * q_down - view_down - down * lambda,
+            -ray,
+        );
+        let step = slopes.inverse() * -rest;
+        off += step.truncate();
+        lambda += step.z;
+    }
+    // A splat does not reach farther.
+    let near = off.abs().max_element() <= f64::from(LARGEST_ELLIPSE);
+    (near && lambda.is_finite()).then_some((off, lambda))
+}
+
+/// Newton's steps, from a pixel or two away.
+const IMAGE_STEPS: usize = 4;
 
 /// From the scene to a cloud's space.
 pub(super) struct Place {

@@ -5,7 +5,7 @@ use glam::{Vec3, Vec4};
 
 use super::beam::{Beam, LANES};
 use super::close::Layer;
-use super::walk::{DEPTH, FORM, PER_HALF, RANGE, S, SMALL, Splats, U, V, WEIGHT};
+use super::walk::{DEPTH, FORM, PER_HALF, RANGE, S, SMALL, Splats, TILT, U, V, WEIGHT};
 use crate::geometry::lanes::{Real, Vector};
 use crate::plan::kernel::{GAIN, WHOLE, closed};
 
@@ -87,9 +87,10 @@ pub(super) fn blend<T: Simd>(
         let mut part = kernel.min(one - full);
         let surfel = splats.surfel[i];
         let shows = surfel < first_hider;
+        let hit = du * splats.value[TILT][i] + dv * splats.value[TILT + 1][i] + s;
         // Nothing is seen behind where a ray starts; mirrors hide from a little beyond it.
         let from = if shows { -CONTACT * beam.length } else { clear };
-        let mut mine = zero.lt(part) & (begin + from).le(zero.splat(s));
+        let mut mine = zero.lt(part) & (begin + from).le(hit);
         if !F::<T>::any(mine) {
             continue;
         }

@@ -11,10 +11,10 @@ mod walk;
 use std::time::Instant;
 
 use fearless_simd::{Simd, dispatch};
-use glam::{Vec3, Vec4};
+use glam::{DVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
-use self::beam::{BLOCK, Beam, Place, lanes, seed};
+use self::beam::{BLOCK, Beam, Place, image_near, lanes, seed};
 use self::blend::CONTACT;
 use self::close::{Layer, Picture, Tile};
 use self::seen::Seen;
@@ -246,13 +246,19 @@ impl Work<'_> {
                         tile.value[at] = done.value(lane);
                         if self.describes {
                             let first = done.first[lane].to_bits() as usize;
-                            let place = seen.splats.place(first);
+                            let place = beam.place(seen.splats.place(first));
+                            let tangent = field.tangent(eye, scene, [column, row]);
+                            let image = image_near(eye, field, &tangent, [column, row], place);
+                            let (off, lambda) = image.unwrap_or_default();
                             let px = [origin[0] as usize + column, origin[1] as usize + row];
                             out.shown.push(Shown {
                                 pixel: px[1] * width + px[0],
                                 surfel: seen.splats.surfel[first],
-                                lambda: beam.lambda(lane, place[2]),
-                                splat: beam.seen_at(lane, px, place),
+                                #[expect(clippy::cast_possible_truncation, reason = "to be kept")]
+                                lambda: lambda as f32,
+                                splat: (DVec2::new(px[0] as f64 + 0.5, px[1] as f64 + 0.5) + off)
+                                    .as_vec2()
+                                    .to_array(),
                             });
                         }
                     }
@@ -325,6 +331,11 @@ impl Work<'_> {
         let cloud = &scene.clouds[cloud];
         let k = frame.per_scene;
         let inside = cloud.tree.bounds().contains(Vec3::from_array(frame.origin));
+        // Rays that leave a mirror's outside are hidden by what faces them of it.
+        let leaves = hides && {
+            let mirror = scene.mirror_triangle(beam.triangle);
+            !mirror.is_seen_from_behind(self.kernel.frame.eye.position)
+        };
         let mut walk = Walk {
             beam,
             frame,
@@ -332,7 +343,7 @@ impl Work<'_> {
             surfels: &scene.surfels,
             range: [first * k, last.min(seen.full_from) * k],
             detail: shared.detail,
-            front_only: cloud.closed && !inside && !hides,
+            front_only: cloud.closed && (leaves || !inside),
         };
         counts.cameras += 1;
         walk.run(simd, seen, counts);

@@ -216,10 +216,12 @@ fn the_nearest_fill_a_pixel_and_the_rest_shows_through() {
 
 #[test]
 fn gaps_are_closed_and_edges_stay() {
-    let size = ImageSize { width: 2 * TILE_PX, height: 1 };
-    let tile = |coverage: &[f32]| {
+    let size = ImageSize { width: 2 * TILE_PX, height: TILE_PX };
+    // All rows are alike.
+    let tile = |row: &[f32; TILE]| {
         let mut tile = Tile { value: [Vec4::ZERO; AREA], layer: [Layer::default(); AREA] };
-        for (i, &full) in coverage.iter().enumerate() {
+        for i in 0..AREA {
+            let full = row[i % TILE];
             tile.value[i] = Vec4::new(full, 0.0, 0.0, full);
             let near = if full > 0.0 { 1.0 } else { 0.0 };
             tile.layer[i] = Layer { open: 1.0 - full, near, behind: 0.0 };

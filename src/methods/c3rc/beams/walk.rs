@@ -39,7 +39,9 @@ pub(super) const PER_HALF: usize = 8;
 pub(super) const RANGE: usize = 10;
 /// How small it is, 1 for what may show something that lies within a pixel.
 pub(super) const SMALL: usize = 11;
-const VALUES: usize = 12;
+/// How the place where a ray meets the disk's plane moves along the axis with the ray's distance along u and v.
+pub(super) const TILT: usize = 12;
+const VALUES: usize = 14;
 /// Surfels looked at together.
 const WIDE: usize = 16;
 
@@ -285,7 +287,6 @@ impl Walk<'_> {
         let far = (middle[2] + half[2]).min(last);
         let mut nearest = [0.0f32; CHILDREN];
         Vector::<T>::store(near, &mut nearest);
-        let mut meets = near.le(far);
         let area = self.area(b, (near + far) * 0.5);
         // Radius of the largest disk that is drawn here.
         let per_pixel = self.detail * std::f32::consts::FRAC_PI_2;
@@ -297,6 +298,8 @@ impl Walk<'_> {
         };
         let disk = extent.min(coarse.max(zero.splat(self.cloud.extent)));
         let disk = disk * (SPREAD * EVENNESS);
+        // A disk reaches beyond its middle also along the axis.
+        let mut meets = near.le(far + disk);
         for k in 0..2 {
             let [s0, s1] = b.starts[k];
             let [t0, t1] = b.slopes[k];
@@ -371,7 +374,7 @@ impl Walk<'_> {
         let beyond_u = low_u.max(high_u).max(zero);
         let beyond_v = low_v.max(high_v).max(zero);
         let lands = F::<T>::mask(simd, lanes)
-            & zero.splat(self.range[0]).le(s)
+            & zero.splat(self.range[0]).le(s + (squared * (SPREAD * SPREAD)).sqrt())
             & s.le(zero.splat(self.range[1]))
             & (beyond_u * beyond_u).le(pixel_u * pixel_u + disk)
             & (beyond_v * beyond_v).le(pixel_v * pixel_v + disk);
@@ -436,6 +439,8 @@ impl Walk<'_> {
         let (mu, mv) = (nu - pu * na, nv - pv * na);
         let thin = (cosine / shown).sqrt();
         let seen = (shown * length).sqrt();
+        let per_along = one / G::<T>::select(along.lt(zero), -seen, seen);
+        let (tilt_u, tilt_v) = (-(nu * per_along), -(nv * per_along));
         let pixel = PIXEL * PIXEL;
         let xx = (pu * pu + one - mu * mu * cut) * disk + (gux * gux + guy * guy) * pixel;
         let xy = (pu * pv - mu * mv * cut) * disk + (gux * gvx + guy * gvy) * pixel;
@@ -474,6 +479,8 @@ impl Walk<'_> {
                 zero.splat(self.frame.per_scene) / half[1],
                 squared.sqrt() * (SAME_SURFACE_RADII * k),
                 small,
+                tilt_u,
+                tilt_v,
             ];
             for k in 0..VALUES {
                 Vector::<T>::compress(values[k], lands, &mut value[k][*len..]);
