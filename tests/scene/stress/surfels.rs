@@ -28,6 +28,9 @@ fn surfels_on_a_line() {
     }
 }
 
+/// A kernel is so many times as wide as its surfel's disk.
+const KERNEL: f32 = 1.3 * 1.5;
+
 #[test]
 fn surfels_in_the_mirror() {
     let mesh = ball();
@@ -40,13 +43,24 @@ fn surfels_in_the_mirror() {
     let (prepared, _) = surfels(&mesh, &points, eye);
     for (way, _, planes) in drawn(&prepared) {
         let covered = covered(&planes);
-        let off = covered.iter().map(|&i| {
-            let at = Vec3::from(planes.position[i]).as_dvec3();
-            (project(&eye, at) - centre(i)).abs().max_element()
-        });
         let disks = way.splat == Splat::Disk;
-        // The vertices lie so far apart that disks are nearly as large as any may be: eight pixels.
-        let far = off.filter(|off| *off > if disks { 8.0 } else { 2.0 }).count();
+        let blocks = disks && way.settings.is_empty();
+        let focal_px = super::super::eye(&prepared, SIZE[0], SIZE[1]).focal_px;
+        // How far from a pixel what it shows may be seen: the vertices lie so far apart that disks are nearly as large as any may be
+        // in cells, eight pixels. In blocks they have the size that they have.
+        let most = |i: usize, at: DVec3| match (blocks, disks) {
+            (true, _) => {
+                let radius = KERNEL * prepared.surfels.extent[planes.surfel[i] as usize];
+                f64::from(radius * focal_px) / (at - EYE).length() + 2.0
+            }
+            (false, true) => 8.0,
+            (false, false) => 2.0,
+        };
+        let far = covered.iter().filter(|&&i| {
+            let at = Vec3::from(planes.position[i]).as_dvec3();
+            (project(&eye, at) - centre(i)).abs().max_element() > most(i, at)
+        });
+        let far = far.count();
         assert!(
             far <= if disks { covered.len() / 500 } else { 0 },
             "{way:?}: {far} of {} pixels show another place",
