@@ -1,7 +1,7 @@
 //! The hybrid method of Mei, Popescu & Sacks 2007: every visible mirror triangle is a continuous 3-ray camera,
 //! culled against the surfels' trees (backward), which then projects and splats what is left (forward).
 //!
-//! Cameras are the mirror's triangles, as in the paper; or cells of the picture ([`cells`]); or blocks of pixels ([`beams`]), whose
+//! Cameras are the mirror's triangles, as in the paper; or cells of the picture (`cells.rs`); or blocks of pixels (`beams`), whose
 //! rays are each taken as they are, so that nothing has to be solved: on the CPU that is the fastest and the most accurate.
 
 mod beams;

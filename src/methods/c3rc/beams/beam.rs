@@ -169,7 +169,7 @@ impl Beam {
             let slope = F::<S>::select(is_seed | !alike, zero, slope[k]);
             Vector::<S>::store(start, &mut beam.start[k]);
             Vector::<S>::store(slope, &mut beam.slope[k]);
-            widest = widest + slope * slope;
+            widest += slope * slope;
             beam.starts[k] = ends(start, alike, far);
             beam.slopes[k] = ends(slope, alike, far);
         }

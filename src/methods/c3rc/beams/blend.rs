@@ -101,29 +101,29 @@ pub(super) fn blend<T: Simd>(
             let now = F::<T>::select(behind, closed(full, [about_u, about_v]), full);
             let scale = F::<T>::select(behind, now / full, one);
             color = [color[0] * scale, color[1] * scale, color[2] * scale];
-            shown = shown * scale;
+            shown *= scale;
             full = now;
             front = F::<T>::select(behind, full, front);
             part = kernel.min(one - full);
-            mine = mine & zero.lt(part);
+            mine &= zero.lt(part);
         }
         part = F::<T>::select(mine, part, zero);
         let fresh = mine & full.le(zero);
         near = F::<T>::select(fresh, zero.splat(depth), near);
-        full = full + part;
+        full += part;
         let of_front = F::<T>::select(one.lt(front), part, zero);
-        about_u = about_u + of_front * (du * splats.value[PER_HALF][i] + splats.value[SMALL][i]);
-        about_v = about_v + of_front * (dv * splats.value[PER_HALF + 1][i]);
+        about_u += of_front * (du * splats.value[PER_HALF][i] + splats.value[SMALL][i]);
+        about_v += of_front * (dv * splats.value[PER_HALF + 1][i]);
         if shows {
             let unseen = mine & shown.le(zero);
             #[expect(clippy::cast_possible_truncation, reason = "indices of a list of f32")]
             let index = zero.splat(f32::from_bits(i as u32));
             first = F::<T>::select(unseen, index, first);
-            shown = shown + part;
+            shown += part;
             let c = radiance[surfel as usize];
-            color[0] = color[0] + part * c.x;
-            color[1] = color[1] + part * c.y;
-            color[2] = color[2] + part * c.z;
+            color[0] += part * c.x;
+            color[1] += part * c.y;
+            color[2] += part * c.z;
         }
         if !F::<T>::any(full.lt(zero.splat(WHOLE))) {
             (used, full_from) = (n + 1, depth);
@@ -135,7 +135,7 @@ pub(super) fn blend<T: Simd>(
         let now = F::<T>::select(open, closed(full, [about_u, about_v]), full);
         let scale = F::<T>::select(open, now / full, one);
         color = [color[0] * scale, color[1] * scale, color[2] * scale];
-        shown = shown * scale;
+        shown *= scale;
         full = now;
     }
     // From where each pixel's ray starts; 0 where nothing is.

@@ -1,4 +1,9 @@
-//! Beams: the mirrors' pixels in blocks of 4 x 4, each of which walks the trees once for all its rays.
+//! Blocks: the mirrors' pixels by 4 x 4, each of which walks the trees once for all its rays.
+//!
+//! The rays of a block that go on from each other are a [`Beam`]. In the plane of a surfel across the beam's axis each ray lies at a
+//! place that is linear in the plane's distance, so that its distance from the surfel is known without solving for anything, on folds and
+//! caustics as elsewhere. A lane is a pixel. Trees are walked near parts first, until a beam's pixels are full; objects before the mirrors that
+//! may hide what was found. A picture's gaps are closed at the end ([`close`]).
 
 mod beam;
 mod blend;
@@ -315,7 +320,6 @@ impl Work<'_> {
     }
 
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "one beam, one cloud")]
     fn walk_cloud<S: Simd>(
         &self,
         simd: S,

@@ -244,7 +244,7 @@ impl Walk<'_> {
             }
         }
         if seen.splats.near.len > 0 {
-            self.take(simd, &bounds, &mut seen.splats, counts);
+            self.take(simd, &bounds, seen.splats, counts);
         }
     }
 
@@ -307,7 +307,7 @@ impl Walk<'_> {
             let high = (near * t1).max(far * t1) + s1;
             let pixel = far * b.width_per_s[k] + b.width[k];
             let reach = half[k] + (disk * disk + pixel * pixel).sqrt();
-            meets = meets & low.le(middle[k] + reach) & (middle[k] - reach).le(high);
+            meets &= low.le(middle[k] + reach) & (middle[k] - reach).le(high);
         }
         let along = dot_const(three(simd, &node.cone_axis), self.frame.axes[2]);
         let cosine = F::<T>::load(simd, &node.cone_cosine);
@@ -316,7 +316,7 @@ impl Walk<'_> {
             let sum_sine = sine * b.gaze[0] + cosine * b.gaze[1];
             let sum_cosine = cosine * b.gaze[0] - sine * b.gaze[1];
             let away = zero.lt(cosine) & zero.lt(sum_cosine) & sum_sine.lt(along);
-            meets = meets & !away;
+            meets &= !away;
         }
         if self.detail <= 0.0 {
             return (F::<T>::bits(meets), [0; 4], nearest);
@@ -395,7 +395,7 @@ impl Walk<'_> {
         <F<T> as Vector<T>>::compress_numbers(simd, &numbers, lands, &mut near.surfel[end..]);
         near.len += bits.count_ones() as usize;
         if near.len >= WIDE {
-            self.take(simd, b, &mut seen.splats, counts);
+            self.take(simd, b, seen.splats, counts);
         }
     }
 
@@ -407,8 +407,8 @@ impl Walk<'_> {
         let Splats { len, value, surfel, near } = splats;
         let lanes = near.len.min(WIDE);
         let mut n = [[0.0f32; WIDE]; 3];
-        for lane in 0..lanes {
-            let normal = self.surfels.normals[near.surfel[lane] as usize];
+        for (lane, surfel) in near.surfel[..lanes].iter().enumerate() {
+            let normal = self.surfels.normals[*surfel as usize];
             (n[0][lane], n[1][lane], n[2][lane]) = (normal.x, normal.y, normal.z);
         }
         let n = [G::<T>::load(simd, &n[0]), G::<T>::load(simd, &n[1]), G::<T>::load(simd, &n[2])];
@@ -425,7 +425,7 @@ impl Walk<'_> {
         let (pu, pv) = ((u * per_s).max(-most).min(most), (v * per_s).max(-most).min(most));
         let along = nu * pu + nv * pv + na;
         if self.front_only {
-            lands = lands & along.lt(zero);
+            lands &= along.lt(zero);
         }
         let (m, o) = (&self.beam.step_per_s, &b.step);
         let (gux, guy) = (at(s, m[0][0], o[0][0]), at(s, m[0][1], o[0][1]));
@@ -452,8 +452,8 @@ impl Walk<'_> {
         let high_u = at(s, b.slopes[0][1], b.starts[0][1]);
         let low_v = at(s, b.slopes[1][0], b.starts[1][0]);
         let high_v = at(s, b.slopes[1][1], b.starts[1][1]);
-        lands = lands & low_u.le(u + half[0]) & (u - half[0]).le(high_u);
-        lands = lands & low_v.le(v + half[1]) & (v - half[1]).le(high_v);
+        lands &= low_u.le(u + half[0]) & (u - half[0]).le(high_u);
+        lands &= low_v.le(v + half[1]) & (v - half[1]).le(high_v);
         let bits = G::<T>::bits(lands);
         if bits != 0 {
             let root = per_det.sqrt();
@@ -528,7 +528,7 @@ pub(super) fn clouds_met<T: Simd>(
         // What a representative of a pixel's size may reach.
         let pixel = far * (2.0 * (x * x + y * y).sqrt()) + 2.0 * (x0 * x0 + y0 * y0).sqrt();
         let reach = half[k] + grow + pixel;
-        meets = meets & low.le(middle[k] + reach) & (middle[k] - reach).le(high);
+        meets &= low.le(middle[k] + reach) & (middle[k] - reach).le(high);
     }
     let mut nearest = [0.0; CHILDREN];
     Vector::<T>::store(near, &mut nearest);
