@@ -107,7 +107,7 @@
 //! - Blocks have a path of their own, from tree to pixel. In a block of 4 × 4 pixels nothing has to be solved: along a beam's axis
 //!   every pixel's ray is a known place in the plane of a surfel, so that a lane a pixel measures how far it passes by. That is exact, a
 //!   fold needs no second root, and with near nodes first the walk ends where the block is full. With cells, which keep culling, projection and
-//!   splatting apart as the paper does, the same pictures took more than twice the time.
+//!   splatting apart as the paper does, pictures took twice the time.
 //! - Culling is not a pass. A splat pass carries a [`plan::BatchSource`], and the backend asks it for the
 //!   batches of a camera when it has room for them. So neither room knows the other, batches stay in the
 //!   cache, and each stage can still be timed.

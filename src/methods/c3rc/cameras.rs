@@ -20,7 +20,7 @@ use crate::scene::prepared::{Cloud, PreparedScene};
 use crate::visibility::Patch;
 
 /// Surfels a hair behind the mirror still count as touching it: this share of the eye's distance (untuned).
-const CONTACT: f64 = 1e-5;
+pub(super) const CONTACT: f64 = 1e-5;
 /// λ ends at this many times the farthest object's distance over the shortest ray: rays interpolated much
 /// shorter than the three given ones are not followed further.
 const SHORTENING: f64 = 1e3;

@@ -3,14 +3,13 @@
 use fearless_simd::{Simd, f32x16};
 use glam::{Vec3, Vec4};
 
+use super::CONTACT;
 use super::beam::{Beam, LANES};
 use super::close::Layer;
 use super::walk::{DEPTH, FORM, PER_HALF, RANGE, S, SMALL, Splats, TILT, U, V, WEIGHT};
 use crate::geometry::lanes::{Real, Vector};
 use crate::plan::kernel::{GAIN, WHOLE, closed};
 
-/// Surfels a hair behind the mirror still count as touching it: this share of the first ray's length (untuned).
-pub(super) const CONTACT: f32 = 1e-5;
 /// What is known of a block's pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Blended {

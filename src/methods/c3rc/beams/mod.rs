@@ -20,12 +20,11 @@ use glam::{DVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use self::beam::{BLOCK, Beam, Place, image_near, lanes, seed};
-use self::blend::CONTACT;
 use self::close::{Layer, Picture, Tile};
 use self::seen::Seen;
 use self::walk::{Splats, Walk, clouds_met};
 use super::super::FrameInput;
-use super::cameras::{CameraSettings, Top};
+use super::cameras::{self, CameraSettings, Top};
 use super::cells::sees_nothing;
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::context::Context;
@@ -33,6 +32,10 @@ use crate::error::Result;
 use crate::image::{Planes, Reason};
 use crate::plan::{GatherCounts, GatherKernel, GatherTimes, Reflection};
 use crate::visibility::mirror_rays::{AREA, RayField, TILE, TILE_PX};
+
+/// See [`cameras::CONTACT`].
+#[expect(clippy::cast_possible_truncation, reason = "rounded once")]
+const CONTACT: f32 = cameras::CONTACT as f32;
 
 pub(super) struct Kernel<'a> {
     pub(super) frame: FrameInput<'a>,

@@ -15,15 +15,15 @@ const FIRST_LOOK: usize = 48;
 pub(super) struct Seen<'a> {
     pub(super) splats: &'a mut Splats,
     /// Those of them that may be seen, from the nearest on: depth and index.
-    pub(super) order: &'a mut Vec<u64>,
+    order: &'a mut Vec<u64>,
     /// How many splats have been entered there.
     entered: usize,
     /// With so many splats, [`Seen::settle`] is due.
     pub(super) until: usize,
     /// Nothing that lies farther is seen.
     pub(super) full_from: f32,
-    pub(super) radiance: &'a [Vec3],
-    pub(super) first_hider: u32,
+    radiance: &'a [Vec3],
+    first_hider: u32,
     /// Mirrors hide from that far on along a ray.
     pub(super) clear: f32,
 }

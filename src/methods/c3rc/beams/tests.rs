@@ -3,7 +3,6 @@
 use fearless_simd::dispatch;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
-use super::super::cameras::Top;
 use super::beam::{BLOCK, Beam, LANES, Place, lanes, seed};
 use super::blend::blend;
 use super::close::{self, Layer, Tile};
@@ -288,6 +287,4 @@ fn blocks_are_drawn_where_they_can_be() {
     assert!(counts.valid > 1000 && counts.valid <= counts.projections, "{counts:?}");
     let covered = out.coverage.iter().filter(|c| **c > 0.5).count();
     assert!(covered > 500, "{covered} pixels show the floor");
-    // A tile may be left out only where nothing is seen.
-    assert!(!Top::new(&scene, &eye).reaches.is_empty());
 }

@@ -122,7 +122,7 @@ struct Bounds {
     width: [f32; 2],
     width_per_s: [f32; 2],
     absolute: [[f32; 3]; 3],
-    /// Slopes are taken at no smaller distance along the axis, and for no steeper.
+    /// Slopes are taken at no smaller distance along the axis, and for no steeper (untuned).
     least: f32,
     steepest: f32,
     gaze: [f32; 2],
