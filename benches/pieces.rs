@@ -3,6 +3,7 @@
 use std::hint::black_box;
 
 use catoptric::Context;
+use catoptric::accel::kd_tree::CHILDREN;
 use catoptric::accel::{KdTree, KdTreeLimits};
 use catoptric::backend::cpu::Cpu;
 use catoptric::camera::Eye;
@@ -142,15 +143,18 @@ struct LeafBoxes {
 
 impl LeafBoxes {
     fn new(tree: &KdTree) -> Self {
-        let leaves = || tree.nodes().iter().filter(|node| node.right == 0);
+        let slots =
+            || tree.wide().iter().flat_map(|node| (0..CHILDREN).map(move |slot| (node, slot)));
+        let leaves = || {
+            let used = slots().filter(|(node, slot)| node.used >> slot & 1 != 0);
+            used.filter(|(node, slot)| node.child[*slot] == 0).map(|(n, slot)| n.get_box(slot))
+        };
         let padded = |mut list: Vec<f32>| {
             list.resize(list.len().next_multiple_of(8), 0.0);
             list
         };
-        let center = [0, 1, 2]
-            .map(|k| padded(leaves().map(|n| 0.5 * (n.bounds.min[k] + n.bounds.max[k])).collect()));
-        let half =
-            [0, 1, 2].map(|k| padded(leaves().map(|n| 0.5 * n.bounds.extent()[k]).collect()));
+        let center = [0, 1, 2].map(|k| padded(leaves().map(|b| b.center()[k]).collect()));
+        let half = [0, 1, 2].map(|k| padded(leaves().map(|b| 0.5 * b.extent()[k]).collect()));
         Self { center, half }
     }
 }

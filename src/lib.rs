@@ -91,8 +91,8 @@
 //!   or a mirror, with their tree; those of mirrors hide what is behind them. **Samples**, per pixel, are those of the
 //!   direct view and of the ray tracer (`spp`).
 //! - **Patch**: a visible mirror triangle, or a part of a large one; or a **cell**: pixels of a 32 × 32 tile whose exact
-//!   rays are nearly linear over the picture, across triangles. **Block**: 4 × 4 pixels; **beam**: those of a block's rays that go
-//!   on from each other. **Batch**: a contiguous range of surfels
+//!   rays are nearly linear over the picture, across triangles. **Block**: 16 × 16 pixels; **beam**: those of a block's rays that go
+//!   on from each other; **group**: 4 × 4 of its pixels. **Batch**: a contiguous range of surfels
 //!   that a camera has to project. **Image**: a place where a camera sees a surfel; there may be three.
 //! - **Path**: a way of light from the eye over a mirror point to a point. **Ghost**: where a range sensor at the eye would see the point
 //!   by it: straight on behind the mirror point, as far as the path is long.
@@ -104,10 +104,10 @@
 //! - A camera belongs to a *patch*, not to a mirror triangle: a large triangle has several, so that the
 //!   work of one task is bounded. Pixels are accepted by [`visibility::MirrorTriangleIndex`], cameras are
 //!   found by patch: the two indices are never mixed.
-//! - Blocks have a path of their own, from tree to pixel. In a block of 4 × 4 pixels nothing has to be solved: along a beam's axis
+//! - Blocks have a path of their own, from tree to pixel. In a block nothing has to be solved: along a beam's axis
 //!   every pixel's ray is a known place in the plane of a surfel, so that a lane a pixel measures how far it passes by. That is exact, a
 //!   fold needs no second root, and with near nodes first the walk ends where the block is full. With cells, which keep culling, projection and
-//!   splatting apart as the paper does, pictures took twice the time.
+//!   splatting apart as the paper does, pictures took two to three times as long.
 //! - Culling is not a pass. A splat pass carries a [`plan::BatchSource`], and the backend asks it for the
 //!   batches of a camera when it has room for them. So neither room knows the other, batches stay in the
 //!   cache, and each stage can still be timed.

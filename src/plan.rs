@@ -1,6 +1,7 @@
 //! A frame as data: passes over named resources, in order. Methods write plans, backends execute them.
 
 pub(crate) mod kernel;
+pub(crate) mod pool;
 pub mod search;
 
 use std::sync::Arc;

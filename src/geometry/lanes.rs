@@ -5,8 +5,8 @@
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use fearless_simd::{
-    Level, Select, Simd, SimdBase, SimdFloat, SimdFrom, SimdMask, f32x8, f32x16, f64x8, u32x8,
-    u32x16,
+    Level, Select, Simd, SimdBase, SimdFloat, SimdFrom, SimdInt, SimdMask, f32x8, f32x16, f64x8,
+    u32x8, u32x16,
 };
 
 pub mod gather;
@@ -170,6 +170,8 @@ pub trait Vector<S: Simd>: Real<Scalar = f32> {
     fn compress(self, mask: Self::Mask, out: &mut [f32]);
     /// [`Vector::compress`] of the first `LANES` of `numbers`.
     fn compress_numbers(simd: S, numbers: &[u32], mask: Self::Mask, out: &mut [u32]);
+    /// The low and the high halves of the first `LANES` of `words`, each as a signed number of 32767ths.
+    fn halves(simd: S, words: &[u32]) -> [Self; 2];
     /// [`Vector::compress`] of `16 (y stride + x) + tag`. Where the mask holds, x, y and tag must be whole, not
     /// negative and below 2^31, 2^31 and 16, and the result in u32.
     fn compress_cells(cell: [Self; 2], stride: u32, tag: Self, mask: Self::Mask, out: &mut [u32]);
@@ -251,6 +253,14 @@ macro_rules! vector_of_floats {
             fn compress_numbers(simd: S, numbers: &[u32], mask: Self::Mask, out: &mut [u32]) {
                 let numbers = $u::from_slice(simd, &numbers[..$n]);
                 SimdBase::compress(numbers, mask).store_slice(&mut out[..$n]);
+            }
+            #[inline(always)]
+            fn halves(simd: S, words: &[u32]) -> [Self; 2] {
+                // As numbers without a sign, 32768 more.
+                let words = $u::from_slice(simd, &words[..$n]) ^ 0x8000_8000;
+                let (low, high): (Self, Self) =
+                    ((words & 0xffff).to_float(), (words >> 16).to_float());
+                [(low - 32768.0) * (1.0 / 32767.0), (high - 32768.0) * (1.0 / 32767.0)]
             }
             #[inline(always)]
             fn compress_cells(
@@ -411,6 +421,12 @@ impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
         V::compress_numbers(simd, numbers, mask.0, out);
         let out = &mut out[V::bits(mask.0).count_ones() as usize..];
         V::compress_numbers(simd, &numbers[V::LANES as usize..], mask.1, out);
+    }
+    #[inline(always)]
+    fn halves(simd: S, words: &[u32]) -> [Self; 2] {
+        let [a, b] = V::halves(simd, words);
+        let [c, d] = V::halves(simd, &words[V::LANES as usize..]);
+        [Self(a, c), Self(b, d)]
     }
     #[inline(always)]
     fn compress_cells(

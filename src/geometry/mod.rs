@@ -4,6 +4,7 @@ pub mod aabb;
 pub mod bicubic;
 pub mod edges;
 pub mod lanes;
+pub mod look;
 pub mod mesh;
 pub mod surfel;
 pub mod transform;

@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::description::{
     Environment, EyeDescription, Light, Mirror, Object, Paint, Proxy, Scene, Source,
@@ -24,6 +25,7 @@ use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::look::Look;
 use crate::geometry::surfel::PADDING;
 use crate::geometry::{Aabb, Mesh, SharedEdge, Similarity, Surfels};
 
@@ -205,6 +207,8 @@ pub struct PreparedScene {
     /// All surfels, cloud by cloud, each in leaf order and followed by its representatives. Those of mirrors have no
     /// radiance.
     pub surfels: Surfels,
+    /// Of the same.
+    pub looks: Vec<Look>,
     /// The objects' triangles in scene space, object by object.
     pub triangles: TriangleBvh,
     /// The mirrors' triangles in scene space, mirror by mirror.
@@ -330,6 +334,7 @@ impl PreparedScene {
             objects,
             clouds,
             surfels,
+            looks: Vec::new(),
             triangles: TriangleBvh::build(&[]),
             mirror_triangles: TriangleBvh::build(&[]),
             sun_map: SunMap::default(),
@@ -372,6 +377,8 @@ impl PreparedScene {
             cloud.tree.average(&mut self.surfels.radiance, cloud.surfels.start as usize);
             cloud.tree.average(&mut self.surfels.albedo, cloud.surfels.start as usize);
         }
+        let both = self.surfels.normals.par_iter().zip(&self.surfels.radiance);
+        both.map(|(n, c)| Look::new(*n, *c)).collect_into_vec(&mut self.looks);
     }
 
     /// Number of surfels over all objects, without representatives.

@@ -46,7 +46,7 @@ fn by_three_ray_cameras() {
 #[test]
 fn with_level_of_detail() {
     same("c3rc --cameras triangles --splat ellipse --detail 4");
-    same("c3rc --quality draft");
+    same("c3rc --cameras triangles --splat square2 --detail 1");
 }
 
 #[test]

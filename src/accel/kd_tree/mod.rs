@@ -57,8 +57,14 @@ pub struct Node {
 /// See the module.
 #[derive(Clone, Debug)]
 pub struct KdTree {
-    nodes: Vec<Node>,
     wide: Vec<WideNode>,
+    /// Tight.
+    bounds: Aabb,
+    surfels: u32,
+    statistics: KdTreeStatistics,
+    /// A frame needs the wide ones only.
+    #[cfg(test)]
+    nodes: Vec<Node>,
 }
 
 /// Figures of a tree, as in the paper's Table 1.
@@ -79,8 +85,14 @@ impl KdTree {
     /// If there are no surfels, or `limits.leaf_points` is 0.
     pub fn build(surfels: &mut Surfels, limits: KdTreeLimits) -> Self {
         let nodes = build::build(surfels, limits);
-        let wide = wide::collapse(&nodes);
-        Self { nodes, wide }
+        Self {
+            wide: wide::collapse(&nodes),
+            bounds: nodes[0].bounds,
+            surfels: nodes[0].count,
+            statistics: KdTreeStatistics::of(&nodes),
+            #[cfg(test)]
+            nodes,
+        }
     }
 
     /// Appends the representatives of all wide nodes to `surfels` (see [`representatives`]): those of wide node w
@@ -92,12 +104,7 @@ impl KdTree {
     /// Gives every representative the mean of its surfels' values. `first`: the first surfel in `values`; the
     /// representatives follow the surfels.
     pub fn average(&self, values: &mut [Vec3], first: usize) {
-        representatives::average(&self.wide, values, first, first + self.nodes[0].count as usize);
-    }
-
-    /// The binary nodes in preorder; the first is the root.
-    pub fn nodes(&self) -> &[Node] {
-        &self.nodes
+        representatives::average(&self.wide, values, first, first + self.surfels as usize);
     }
 
     /// The eight-wide nodes; the first is the root.
@@ -107,20 +114,21 @@ impl KdTree {
 
     /// Tight box of all surfels.
     pub fn bounds(&self) -> Aabb {
-        self.nodes[0].bounds
+        self.bounds
     }
 
     /// Radius of a disk of the area that a surfel has to itself, as the leaves' boxes tell: nine of ten leaves need no
     /// larger one.
     pub fn spacing_extent(&self) -> f32 {
-        let of_leaf = |node: &Node| {
-            let [a, b, c] = node.bounds.extent().to_array();
-            let (longest, n) = (a.max(b).max(c), node.count as f32);
+        let of_leaf = |(node, slot): (&WideNode, usize)| {
+            let [a, b, c] = node.get_box(slot).extent().to_array();
+            let (longest, n) = (a.max(b).max(c), node.count[slot] as f32);
             let second = (a + b + c - longest - a.min(b).min(c)).max(longest / n);
             // A square of k x k surfels reaches over k - 1 spacings.
             (longest * second).sqrt() / (n.sqrt() - 1.0).max(0.5)
         };
-        let leaves = self.nodes.iter().filter(|node| node.right == 0 && node.count > 1);
+        let slots = self.wide.iter().flat_map(|node| (0..CHILDREN).map(move |slot| (node, slot)));
+        let leaves = slots.filter(|(node, slot)| node.child[*slot] == 0 && node.count[*slot] > 1);
         let mut spacings: Vec<f32> = leaves.map(of_leaf).filter(|s| *s > 0.0).collect();
         // Of one surfel, or several at one place, nothing is known.
         let Some(last) = spacings.len().checked_sub(1) else {
@@ -133,30 +141,12 @@ impl KdTree {
 
     /// Leaves, depth and filling.
     pub fn statistics(&self) -> KdTreeStatistics {
-        let mut depths = Vec::with_capacity(64);
-        let (mut leaves, mut depth_sum) = (0usize, 0usize);
-        for node in &self.nodes {
-            let depth = depths.pop().unwrap_or(0usize);
-            if node.right == 0 {
-                leaves += 1;
-                depth_sum += depth;
-            } else {
-                depths.push(depth + 1);
-                depths.push(depth + 1);
-            }
-        }
-        KdTreeStatistics {
-            leaves,
-            mean_depth: depth_sum as f64 / leaves as f64,
-            points_per_leaf: f64::from(self.nodes[0].count) / leaves as f64,
-        }
+        self.statistics
     }
 
-    /// Checks every invariant.
-    ///
-    /// # Errors
-    /// Says which node breaks which.
-    pub fn validate(&self, surfels: &Surfels, limits: KdTreeLimits) -> Result<(), String> {
+    /// Checks every invariant; else says which node breaks which.
+    #[cfg(test)]
+    pub(crate) fn validate(&self, surfels: &Surfels, limits: KdTreeLimits) -> Result<(), String> {
         let mut next = 0u32;
         for (i, node) in self.nodes.iter().enumerate() {
             let range = node.first as usize..(node.first + node.count) as usize;
@@ -194,6 +184,28 @@ impl KdTree {
             return Err(format!("the leaves hold {next} of {} surfels", surfels.len()));
         }
         wide::validate(&self.wide, &self.nodes)
+    }
+}
+
+impl KdTreeStatistics {
+    fn of(nodes: &[Node]) -> Self {
+        let mut depths = Vec::with_capacity(64);
+        let (mut leaves, mut depth_sum) = (0usize, 0usize);
+        for node in nodes {
+            let depth = depths.pop().unwrap_or(0usize);
+            if node.right == 0 {
+                leaves += 1;
+                depth_sum += depth;
+            } else {
+                depths.push(depth + 1);
+                depths.push(depth + 1);
+            }
+        }
+        Self {
+            leaves,
+            mean_depth: depth_sum as f64 / leaves as f64,
+            points_per_leaf: f64::from(nodes[0].count) / leaves as f64,
+        }
     }
 }
 

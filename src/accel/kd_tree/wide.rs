@@ -12,7 +12,7 @@ pub(super) const WIDTH: u32 = 8;
 const CONE_SLACK: f32 = 1e-5;
 
 /// Eight boxes and what is in them. Unused ones are empty (count 0).
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WideNode {
     /// Middles by axis.
     pub center: [[f32; CHILDREN]; 3],
@@ -32,6 +32,8 @@ pub struct WideNode {
     pub cone_cosine: [f32; CHILDREN],
     /// Sine of that.
     pub cone_sine: [f32; CHILDREN],
+    /// How many children each child has, if it is no leaf.
+    pub parts: [u8; CHILDREN],
     /// Bit i: child i is used.
     pub used: u64,
 }
@@ -48,6 +50,7 @@ impl WideNode {
         cone_axis: [[0.0; CHILDREN]; 3],
         cone_cosine: [-1.0; CHILDREN],
         cone_sine: [0.0; CHILDREN],
+        parts: [0; CHILDREN],
         used: 0,
     };
 
@@ -105,6 +108,15 @@ pub(super) fn collapse(nodes: &[Node]) -> Vec<WideNode> {
             wide[at].child[slot] = u32::try_from(child).expect("fewer nodes than surfels");
         }
     }
+    for at in 0..wide.len() {
+        for slot in 0..CHILDREN {
+            let child = wide[at].child[slot] as usize;
+            if child != 0 {
+                let parts = wide[child].used.count_ones();
+                wide[at].parts[slot] = u8::try_from(parts).expect("at most eight");
+            }
+        }
+    }
     wide
 }
 
@@ -143,6 +155,7 @@ fn descendants(nodes: &[Node], leaves: &[u32], root: usize, most: u32, list: &mu
     }
 }
 
+#[cfg(test)]
 pub(super) fn validate(wide: &[WideNode], nodes: &[Node]) -> Result<(), String> {
     let mut next = 0;
     let mut open = vec![(0usize, 0usize)];

@@ -5,7 +5,6 @@ pub mod finish;
 mod look;
 pub(crate) mod lookup;
 pub(crate) mod planes;
-pub mod pool;
 pub(crate) mod search;
 pub mod splat;
 
@@ -13,11 +12,11 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use self::pool::Pool;
 use self::splat::Landed;
 use super::{Backend, ExecuteReport};
 use crate::error::Result;
 use crate::image::Planes;
+use crate::plan::pool::Pool;
 use crate::plan::{Pass, Plan, Reflection};
 use crate::scene::prepared::{PreparedScene, milliseconds};
 use crate::visibility::Visibility;

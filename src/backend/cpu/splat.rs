@@ -17,11 +17,11 @@ use self::blend::{Blended, Layers};
 use self::hits::Hits;
 use self::packed::{Packed, Rest};
 pub(crate) use self::projection::Projection;
-use super::pool::Pool;
 use crate::context::Context;
 use crate::geometry::Surfels;
 use crate::geometry::lanes::{Pair, simd_level};
 use crate::geometry::surfel::PADDING;
+use crate::plan::pool::Pool;
 use crate::plan::{Batch, SplatPass, SplatShape};
 use crate::visibility::{Patch, Visibility};
 

@@ -1,10 +1,10 @@
 //! A scene's surfels on the device.
 
-use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::device::Gpu;
 use crate::error::Result;
+use crate::geometry::look::packed_normal;
 use crate::scene::prepared::PreparedScene;
 
 /// In the order of the scene; a list each, so that none is larger than a binding may be.
@@ -75,24 +75,6 @@ fn send<T: bytemuck::Pod>(
         })?;
     }
     Ok(())
-}
-
-/// A unit vector as a place on the unfolded octahedron (Cigolle et al. 2014, "oct32").
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "16 bits")]
-pub(super) fn packed_normal(n: Vec3) -> u32 {
-    let sum = n.abs().element_sum();
-    if sum.is_nan() || sum <= 0.0 {
-        return 0;
-    }
-    let p = Vec2::new(n.x, n.y) / sum;
-    let folded = if n.z < 0.0 {
-        let sign = |v: f32| if v >= 0.0 { 1.0 } else { -1.0 };
-        Vec2::new((1.0 - p.y.abs()) * sign(p.x), (1.0 - p.x.abs()) * sign(p.y))
-    } else {
-        p
-    };
-    let half = |v: f32| u32::from((v.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);
-    half(folded.x) | half(folded.y) << 16
 }
 
 /// The nearest half (IEEE 754 binary16); what is negative or no number is 0, what is too large the largest.

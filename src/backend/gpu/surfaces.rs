@@ -6,8 +6,9 @@ use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::records::Row;
-use super::scene::{packed_half, packed_normal};
+use super::scene::packed_half;
 use crate::error::Result;
+use crate::geometry::look::packed_normal;
 use crate::scene::description::{Paint, PatternKind};
 use crate::scene::prepared::PreparedScene;
 use crate::visibility::{NONE_ID, Visibility};

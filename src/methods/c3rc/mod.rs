@@ -34,7 +34,7 @@ static INFO: MethodInfo = MethodInfo {
     params: &[
         ParamInfo {
             id: "cameras",
-            about: "what one camera sees for: 4 x 4 pixels by their exact rays (with ellipses, on the CPU; else cells), pixels whose rays are nearly linear, or a triangle of the mirror",
+            about: "what one camera sees for: 16 x 16 pixels by their exact rays (with ellipses, on the CPU; else cells), pixels whose rays are nearly linear, or a triangle of the mirror",
             unit: "",
             kind: ParamKind::Choice(&["triangles", "cells", "blocks"]),
             default: Value::Choice("blocks"),
@@ -101,8 +101,8 @@ static INFO: MethodInfo = MethodInfo {
     qualities: &[
         Preset {
             id: "draft",
-            about: "a camera a triangle, squares of 2 x 2 pixels, one splat a pixel",
-            params: &[("cameras", "triangles"), ("splat", "square2"), ("detail", "1")],
+            about: "one ellipse a pixel",
+            params: &[("cameras", "blocks"), ("splat", "ellipse"), ("detail", "1")],
             leaf_points: None,
         },
         Preset {

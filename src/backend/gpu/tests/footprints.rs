@@ -3,7 +3,6 @@
 use glam::{DVec2, DVec3};
 
 use super::super::records::Records;
-use super::super::scene::packed_normal;
 use super::super::shaders;
 use super::pictures::{eye, scene, seen};
 use super::twins::unpacked_normal;
@@ -11,6 +10,7 @@ use super::{device, run};
 use crate::backend::cpu::splat::projection as constants;
 use crate::context::Context;
 use crate::geometry::lanes::{Real, Scalar, cross, dot};
+use crate::geometry::look::packed_normal;
 use crate::methods::{FrameInput, Params, method};
 use crate::plan::{CameraInstance, LARGEST_ELLIPSE, Pass, Plan, SplatPass, SplatShape, kernel};
 use crate::scene::PreparedScene;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::super::records::{CHUNK, Frame, LAYOUT, Row};
-use super::super::scene::{packed_half, packed_normal};
+use super::super::scene::packed_half;
 use super::super::shaders;
 use super::{device, run};
 use crate::camera::RayScale;
@@ -11,6 +11,7 @@ use crate::camera::three_ray::multiplicity::Jacobian;
 use crate::camera::three_ray::tests::Numbers;
 use crate::camera::three_ray::{Rays, ThreeRay, project};
 use crate::geometry::lanes::{Real, Scalar};
+use crate::geometry::look::packed_normal;
 use crate::plan::{SplatShape, kernel};
 
 /// What the GPU's error may be, over f32's or its precision, whichever is larger.

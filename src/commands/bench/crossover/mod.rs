@@ -32,8 +32,12 @@ struct Setting {
 }
 
 const SETTINGS: [Setting; 4] = [
+    Setting {
+        name: "triangles",
+        quality: "",
+        values: &[("cameras", "triangles"), ("splat", "square2"), ("detail", "1")],
+    },
     Setting { name: "draft", quality: "draft", values: &[] },
-    Setting { name: "detail 1", quality: "", values: &[("detail", "1")] },
     Setting { name: "default", quality: "", values: &[] },
     Setting { name: "best", quality: "best", values: &[] },
 ];
@@ -79,8 +83,8 @@ impl Cell {
         good.map(ratio).min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// The fastest setting, with a camera a triangle as the paper has it, by one ray a pixel.
-    fn draft(&self) -> f64 {
+    /// A camera a triangle as the paper has it, by one ray a pixel.
+    fn triangles(&self) -> f64 {
         Self::to_one_ray(&self.cameras[0])
     }
 }

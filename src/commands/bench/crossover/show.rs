@@ -8,7 +8,7 @@ use super::super::tables::frame_figures;
 use super::{Cell, EQUAL, Entry, Map, SETTINGS, SPP};
 use crate::commands::plots::{Axis, Dot, HeatMap, LinePlot, Series, heat_maps, lines, short};
 
-pub(super) const NOTE: &str = "Cameras (c3rc: draft, detail 1, default, best) and rays (1, 4, 16 a pixel) draw the same reflections; each is \
+pub(super) const NOTE: &str = "Cameras (c3rc: a camera a triangle with squares, draft, default, best) and rays (1, 4, 16 a pixel) draw the same reflections; each is \
     timed in turn with one ray a pixel. The error is the RMSE (linear, values above white as white) against many rays a pixel where objects are reflected. At equal error \
     counts the fastest setting of cameras whose error is at most 5 % above that of the rays; where there is none, cameras do not \
     reach that error, at whatever time. Below 1 cameras win. The paper conjectures a break-even in pixels per mirror triangle and \
@@ -18,13 +18,13 @@ pub(super) const NOTE: &str = "Cameras (c3rc: draft, detail 1, default, best) an
 type View = (String, fn(&Cell, usize) -> Option<f64>, usize);
 
 fn views() -> Vec<View> {
-    let draft: View =
-        ("a camera a triangle (draft), any error, to 1 ray".into(), |c, _| Some(c.draft()), 0);
+    let triangles: View =
+        ("a camera a triangle, any error, to 1 ray".into(), |c, _| Some(c.triangles()), 0);
     let equal = (0..SPP.len()).map(|k| -> View {
         let rays = if SPP[k] == 1 { "1 ray".to_owned() } else { format!("{} rays", SPP[k]) };
         (format!("equal error, to {rays}"), |c, k| c.at_equal_error(k).map(|e| e.1), k)
     });
-    std::iter::once(draft).chain(equal).collect()
+    std::iter::once(triangles).chain(equal).collect()
 }
 
 /// Adds all maps.
@@ -69,7 +69,7 @@ fn curve(maps: &[Map]) -> anyhow::Result<Plot> {
     for map in maps {
         for (name, of, k) in views().into_iter().take(2) {
             let dot = |c: &Cell| Some(Dot::exact(c.pixels_a_triangle, of(c, k)?));
-            let short = if name.starts_with("equal") { "equal error" } else { "draft" };
+            let short = if name.starts_with("equal") { "equal error" } else { "triangles" };
             series.push(Series {
                 name: format!("{}: {short}", map.scene),
                 dots: map.cells.iter().filter_map(dot).collect(),

@@ -3,21 +3,18 @@
 use fearless_simd::{Simd, f32x16};
 use glam::{DMat3, DVec2, DVec3, Mat3, Vec3};
 
+use super::block::{Block, GROUP, GROUPS, LANES, SIDE};
 use crate::camera::Eye;
 use crate::geometry::Similarity;
 use crate::geometry::lanes::{Real, Vector, dot_const};
 use crate::plan::LARGEST_ELLIPSE;
 use crate::visibility::mirror_rays::{Linear, RayField, TILE};
 
-/// Columns and rows of a block.
-pub(super) const BLOCK: usize = 4;
-/// Pixels of a block: lanes.
-pub(super) const LANES: usize = BLOCK * BLOCK;
 /// Rays belong to one beam if the linear function that describes its first one's neighbourhood is no farther off than this, in
 /// pixels (untuned).
-const ALIKE_PX: f32 = 1.5;
+const ALIKE_PX: f32 = 2.0;
 /// Rays of one beam start so many pixels' steps from its first one at most (untuned).
-const NEAR_PX: f32 = 12.0;
+const NEAR_PX: f32 = 60.0;
 /// The least cosine of a ray's angle with the beam's axis.
 const AHEAD: f32 = 0.6;
 
@@ -30,26 +27,36 @@ pub(super) struct Beam {
     pub(super) axes: [Vec3; 3],
     /// The mirror triangle of the first ray.
     pub(super) triangle: u32,
-    /// Bit i: pixel i of the block is the beam's.
-    pub(super) pixels: u32,
-    /// By axis and pixel.
-    pub(super) start: [[f32; LANES]; 2],
-    /// By axis and pixel.
-    pub(super) slope: [[f32; LANES]; 2],
-    /// Where along the axis each pixel's ray starts.
-    pub(super) begin: [f32; LANES],
-    /// Where the first of them does.
+    /// By group: bit i: pixel i of the group is the beam's.
+    pub(super) pixels: [u32; GROUPS],
+    /// By group; any numbers in one without pixels.
+    pub(super) rays: [Rays; GROUPS],
+    /// Where along the axis the first of all rays starts, and the last.
     pub(super) first: f32,
+    pub(super) last: f32,
     /// Least and most of starts and slopes, by axis.
     pub(super) starts: [[f32; 2]; 2],
     pub(super) slopes: [[f32; 2]; 2],
     /// How a ray's place in the plane moves with its pixel, one to the right and one down: by axis, at s = 0 and by s.
     pub(super) step: [[f32; 2]; 2],
     pub(super) step_per_s: [[f32; 2]; 2],
+    /// The first ray's pixel, from the block's first column and row on.
+    pub(super) at: [f32; 2],
     /// Length of the first ray's direction: its λ is s by this.
     pub(super) length: f32,
     /// Tangent of the widest angle of a ray with the axis.
     pub(super) spread: f32,
+}
+
+/// Of a group's pixels, by lane.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rays {
+    /// By axis.
+    pub(super) start: [[f32; LANES]; 2],
+    /// By axis.
+    pub(super) slope: [[f32; LANES]; 2],
+    /// Where along the axis each ray starts.
+    pub(super) begin: [f32; LANES],
 }
 
 /// Relative to a beam's own space: what a cloud's space has for it.
@@ -62,19 +69,37 @@ pub(super) struct Frame {
 }
 
 impl Beam {
-    /// The beam of the pixel `seed` of a tile and of those pixels of its block, among `left` (by lane), that go on from it.
-    /// `corner`: the block's first column and row.
+    pub(super) fn empty() -> Self {
+        Self {
+            origin: Vec3::ZERO,
+            axes: [Vec3::X, Vec3::Y, Vec3::Z],
+            triangle: 0,
+            pixels: [0; GROUPS],
+            rays: [Rays::default(); GROUPS],
+            first: 0.0,
+            last: 0.0,
+            starts: [[0.0; 2]; 2],
+            slopes: [[0.0; 2]; 2],
+            step: [[0.0; 2]; 2],
+            step_per_s: [[0.0; 2]; 2],
+            at: [0.0; 2],
+            length: 0.0,
+            spread: 0.0,
+        }
+    }
+
+    /// Becomes the beam of a tile's pixel `at` and of those pixels that are left of its block and go on from it.
     #[inline(always)]
-    pub(super) fn new<S: Simd>(
+    pub(super) fn aim<S: Simd>(
+        &mut self,
         simd: S,
         eye: &Eye,
         field: &RayField,
         tangent: &Linear<4>,
-        corner: [usize; 2],
-        seed: usize,
-        left: u32,
-    ) -> Self {
-        let at = [corner[0] + seed % BLOCK, corner[1] + seed / BLOCK];
+        block: &Block,
+        at: [usize; 2],
+    ) {
+        let corner = block.corner;
         let [f0, f1, f2, q] = field.at(at);
         let toward = Vec3::new(f0, f1, f2);
         let length = toward.length();
@@ -102,82 +127,101 @@ impl Beam {
         let step_per_s = [u, v].map(|e| turn.map(|t| e.dot(t)));
         let widths = step_per_s.map(|[x, y]| (x * x + y * y).sqrt() + 0.1 / eye.focal_px);
         let reach = NEAR_PX * (shift[0].length() + shift[1].length());
-        let mut beam = Self {
-            origin,
-            axes,
-            triangle: field.ids[at[1] * TILE + at[0]],
-            pixels: 0,
-            start: [[0.0; LANES]; 2],
-            slope: [[0.0; LANES]; 2],
-            begin: [0.0; LANES],
-            first: 0.0,
-            starts: [[0.0; 2]; 2],
-            slopes: [[0.0; 2]; 2],
-            step,
-            step_per_s,
-            length: length / q,
-            spread: 0.0,
-        };
-        // All rays of the block, a lane each.
-        let block = field.block(corner);
-        let load = [
-            F::<S>::load(simd, &block[0]),
-            F::<S>::load(simd, &block[1]),
-            F::<S>::load(simd, &block[2]),
-        ];
+        (self.origin, self.axes) = (origin, axes);
+        self.triangle = field.ids[at[1] * TILE + at[0]];
+        (self.step, self.step_per_s, self.length) = (step, step_per_s, length / q);
+        self.at = [(at[0] - corner[0]) as f32, (at[1] - corner[1]) as f32];
         let zero = F::<S>::broadcast(simd, 0.0);
         let one = zero.splat(1.0);
-        let own = F::<S>::mask(simd, u64::from(left));
-        let along = dot_const(load, a.to_array());
-        let squared = load[0] * load[0] + load[1] * load[1] + load[2] * load[2];
-        // Lanes that are not among `left` hold anything.
-        let ahead = own & zero.lt(along) & (squared * (AHEAD * AHEAD)).le(along * along);
-        let per_along = one / F::<S>::select(ahead, along, one);
-        let slope =
-            [dot_const(load, u.to_array()) * per_along, dot_const(load, v.to_array()) * per_along];
-        let depth = one / F::<S>::select(ahead, F::<S>::load(simd, &block[3]), one);
-        let dx = F::<S>::load(simd, &COLUMNS) - (seed % BLOCK) as f32;
-        let dy = F::<S>::load(simd, &ROWS) - (seed / BLOCK) as f32;
+        let far = zero.splat(f32::MAX);
+        let (mut widest, mut first, mut last) = (zero, far, -far);
+        let mut lows = [[far; 2]; 2];
+        let mut highs = [[-far; 2]; 2];
         let from = eye.position - origin;
         let [right, down] = moved;
-        let start_of = [
-            (dx * right.x + dy * down.x + view.x) * depth + from.x,
-            (dx * right.y + dy * down.y + view.y) * depth + from.y,
-            (dx * right.z + dy * down.z + view.z) * depth + from.z,
-        ];
-        let before = dot_const(start_of, a.to_array());
-        let start = [
-            dot_const(start_of, u.to_array()) - slope[0] * before,
-            dot_const(start_of, v.to_array()) - slope[1] * before,
-        ];
-        let off_u = (slope[0] - dx * step_per_s[0][0] - dy * step_per_s[0][1]) * (1.0 / widths[0]);
-        let off_v = (slope[1] - dx * step_per_s[1][0] - dy * step_per_s[1][1]) * (1.0 / widths[1]);
-        let apart =
-            start_of[0] * start_of[0] + start_of[1] * start_of[1] + start_of[2] * start_of[2];
-        let alike = ahead
-            & (off_u * off_u + off_v * off_v).le(zero.splat(ALIKE_PX * ALIKE_PX))
-            & apart.le(zero.splat(reach * reach));
-        let alike = alike | F::<S>::mask(simd, 1 << seed);
-        #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-        let pixels = F::<S>::bits(alike) as u32;
-        beam.pixels = pixels;
-        let (mut widest, far) = (zero, zero.splat(f32::MAX));
-        for k in 0..2 {
+        for (group, left) in block.left.into_iter().enumerate() {
+            self.pixels[group] = 0;
+            if left == 0 {
+                continue;
+            }
+            // All rays of the group, a lane each.
+            let corner = [corner[0] + group % SIDE * GROUP, corner[1] + group / SIDE * GROUP];
+            let block = field.block(corner);
+            let load = [
+                F::<S>::load(simd, &block[0]),
+                F::<S>::load(simd, &block[1]),
+                F::<S>::load(simd, &block[2]),
+            ];
+            let own = F::<S>::mask(simd, u64::from(left));
+            let along = dot_const(load, a.to_array());
+            let squared = load[0] * load[0] + load[1] * load[1] + load[2] * load[2];
+            // Lanes that are not among `left` hold anything.
+            let ahead = own & zero.lt(along) & (squared * (AHEAD * AHEAD)).le(along * along);
+            let per_along = one / F::<S>::select(ahead, along, one);
+            let slope = [
+                dot_const(load, u.to_array()) * per_along,
+                dot_const(load, v.to_array()) * per_along,
+            ];
+            let depth = one / F::<S>::select(ahead, F::<S>::load(simd, &block[3]), one);
+            let dx = F::<S>::load(simd, &COLUMNS) + (corner[0] as f32 - at[0] as f32);
+            let dy = F::<S>::load(simd, &ROWS) + (corner[1] as f32 - at[1] as f32);
+            let start_of = [
+                (dx * right.x + dy * down.x + view.x) * depth + from.x,
+                (dx * right.y + dy * down.y + view.y) * depth + from.y,
+                (dx * right.z + dy * down.z + view.z) * depth + from.z,
+            ];
+            let before = dot_const(start_of, a.to_array());
+            let start = [
+                dot_const(start_of, u.to_array()) - slope[0] * before,
+                dot_const(start_of, v.to_array()) - slope[1] * before,
+            ];
+            let off_u =
+                (slope[0] - dx * step_per_s[0][0] - dy * step_per_s[0][1]) * (1.0 / widths[0]);
+            let off_v =
+                (slope[1] - dx * step_per_s[1][0] - dy * step_per_s[1][1]) * (1.0 / widths[1]);
+            let apart =
+                start_of[0] * start_of[0] + start_of[1] * start_of[1] + start_of[2] * start_of[2];
+            let alike = ahead
+                & (off_u * off_u + off_v * off_v).le(zero.splat(ALIKE_PX * ALIKE_PX))
+                & apart.le(zero.splat(reach * reach));
             // The first ray is the axis itself.
-            let is_seed = F::<S>::mask(simd, 1 << seed);
-            let start = F::<S>::select(is_seed | !alike, zero, start[k]);
-            let slope = F::<S>::select(is_seed | !alike, zero, slope[k]);
-            Vector::<S>::store(start, &mut beam.start[k]);
-            Vector::<S>::store(slope, &mut beam.slope[k]);
-            widest += slope * slope;
-            beam.starts[k] = ends(start, alike, far);
-            beam.slopes[k] = ends(slope, alike, far);
+            let is_first =
+                at[0].wrapping_sub(corner[0]) < GROUP && at[1].wrapping_sub(corner[1]) < GROUP;
+            let lane =
+                if is_first { 1 << ((at[1] - corner[1]) * GROUP + at[0] - corner[0]) } else { 0 };
+            let itself = F::<S>::mask(simd, lane);
+            let alike = alike | itself;
+            #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+            let pixels = F::<S>::bits(alike) as u32;
+            self.pixels[group] = pixels;
+            if pixels == 0 {
+                continue;
+            }
+            let rays = &mut self.rays[group];
+            let none = itself | !alike;
+            let mut angle = zero;
+            for k in 0..2 {
+                let start = F::<S>::select(none, zero, start[k]);
+                let slope = F::<S>::select(none, zero, slope[k]);
+                Vector::<S>::store(start, &mut rays.start[k]);
+                Vector::<S>::store(slope, &mut rays.slope[k]);
+                angle += slope * slope;
+                // The axis is among them, so that zeros do not matter.
+                lows[k] = [lows[k][0].min(start), lows[k][1].min(slope)];
+                highs[k] = [highs[k][0].max(start), highs[k][1].max(slope)];
+            }
+            let before = F::<S>::select(none, zero, before);
+            Vector::<S>::store(before, &mut rays.begin);
+            (first, last) = (first.min(before), last.max(before));
+            widest = widest.max(angle);
         }
-        let before = F::<S>::select(F::<S>::mask(simd, 1 << seed) | !alike, zero, before);
-        Vector::<S>::store(before, &mut beam.begin);
-        beam.first = ends(before, alike, far)[0];
-        beam.spread = ends(widest, alike, far)[1].sqrt();
-        beam
+        for k in 0..2 {
+            self.starts[k] = [least::<S>(lows[k][0]), -least::<S>(-highs[k][0])];
+            self.slopes[k] = [least::<S>(lows[k][1]), -least::<S>(-highs[k][1])];
+        }
+        self.first = least::<S>(first);
+        self.last = -least::<S>(-last);
+        self.spread = (-least::<S>(-widest)).sqrt();
     }
 
     /// The scene's place at u, v, s.
@@ -264,27 +308,25 @@ impl Place {
 
 type F<S> = f32x16<S>;
 
-/// The least and the most of the lanes of `mask`, which has some.
+/// The least of all lanes.
 #[inline(always)]
-fn ends<S: Simd>(values: F<S>, mask: <F<S> as Real>::Mask, far: F<S>) -> [f32; 2] {
-    let (mut low, mut high) = ([0.0f32; LANES], [0.0f32; LANES]);
-    Vector::<S>::store(F::<S>::select(mask, values, far), &mut low);
-    Vector::<S>::store(F::<S>::select(mask, values, -far), &mut high);
+pub(super) fn least<S: Simd>(values: F<S>) -> f32 {
+    let mut low = [0.0f32; LANES];
+    Vector::<S>::store(values, &mut low);
     let mut half = LANES / 2;
     while half > 0 {
         for i in 0..half {
             low[i] = low[i].min(low[i + half]);
-            high[i] = high[i].max(high[i + half]);
         }
         half /= 2;
     }
-    [low[0], high[0]]
+    low[0]
 }
 
 /// By lane.
-const COLUMNS: [f32; LANES] =
+pub(super) const COLUMNS: [f32; LANES] =
     [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
-const ROWS: [f32; LANES] =
+pub(super) const ROWS: [f32; LANES] =
     [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
 
 /// Cosine and sine of half the angle of a direction; of none for no direction.
@@ -301,15 +343,4 @@ fn half_angle(x: f32, y: f32) -> (f32, f32) {
         let sine = (0.5 - 0.5 * double).sqrt();
         (0.5 * y / length / sine, sine)
     }
-}
-
-/// Lanes of a block that are among a tile's pixels.
-pub(super) fn lanes(mask: &[u32; TILE], [x, y]: [usize; 2]) -> u32 {
-    (0..BLOCK).fold(0, |all, row| all | (mask[y + row] >> x & ((1 << BLOCK) - 1)) << (BLOCK * row))
-}
-
-/// The lane among `left` nearest to the block's middle.
-pub(super) fn seed(left: u32) -> usize {
-    const BY_DISTANCE: [usize; LANES] = [5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15];
-    BY_DISTANCE.into_iter().find(|lane| left >> lane & 1 != 0).unwrap_or(0)
 }

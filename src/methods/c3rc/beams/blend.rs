@@ -1,16 +1,19 @@
 //! A beam's splats to its pixels, from the nearest on; a lane is a pixel.
 
 use fearless_simd::{Simd, f32x16};
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 
-use super::CONTACT;
-use super::beam::{Beam, LANES};
+use super::beam::{Beam, Rays};
+use super::block::LANES;
 use super::close::Layer;
-use super::walk::{DEPTH, FORM, PER_HALF, RANGE, S, SMALL, Splats, TILT, U, V, WEIGHT};
+use super::seen::{AT_ONCE, depth_of, index, of_group};
+use super::splats::{
+    FARTHER, FORM, PER_HALF, RADIANCE, S, SMALL, Splats, TILT, U, V, WEIGHT, WIDE,
+};
 use crate::geometry::lanes::{Real, Vector};
-use crate::plan::kernel::{GAIN, WHOLE, closed};
+use crate::plan::kernel::{WHOLE, closed};
 
-/// What is known of a block's pixels.
+/// What is known of a group's pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Blended {
     /// Radiance times coverage.
@@ -22,8 +25,7 @@ pub(super) struct Blended {
     pub(super) front: [f32; LANES],
     /// Index of the nearest that shows an object; bits.
     pub(super) first: [f32; LANES],
-    /// So many of the nearest splats fill all pixels, up to a depth.
-    pub(super) used: usize,
+    /// The splats up to this depth fill all pixels.
     pub(super) full_from: f32,
 }
 
@@ -48,84 +50,94 @@ fn out<T: Simd>(v: F<T>) -> [f32; LANES] {
     list
 }
 
-/// Blends what a beam sees, in the given order.
+/// Blends what a group of a beam sees, in the given order. `describes`: whether [`Blended::first`] is wanted.
 #[inline(always)]
 pub(super) fn blend<T: Simd>(
     simd: T,
     beam: &Beam,
+    group: usize,
     splats: &Splats,
     order: &[u64],
-    radiance: &[Vec3],
-    first_hider: u32,
-    clear: f32,
+    groups: &[u16],
+    describes: bool,
 ) -> Blended {
     let zero = F::<T>::broadcast(simd, 0.0);
     let one = F::<T>::broadcast(simd, 1.0);
-    let own = F::<T>::mask(simd, u64::from(beam.pixels));
-    let (start_u, start_v) =
-        (F::<T>::load(simd, &beam.start[0]), F::<T>::load(simd, &beam.start[1]));
-    let (slope_u, slope_v) =
-        (F::<T>::load(simd, &beam.slope[0]), F::<T>::load(simd, &beam.slope[1]));
-    let begin = F::<T>::load(simd, &beam.begin);
+    let far = F::<T>::broadcast(simd, f32::INFINITY);
+    let own = F::<T>::mask(simd, u64::from(beam.pixels[group]));
+    let Rays { start, slope, begin } = &beam.rays[group];
+    let (start_u, start_v) = (F::<T>::load(simd, &start[0]), F::<T>::load(simd, &start[1]));
+    let (slope_u, slope_v) = (F::<T>::load(simd, &slope[0]), F::<T>::load(simd, &slope[1]));
+    let begin = F::<T>::load(simd, begin);
     let mut full = F::<T>::select(own, zero, one);
     let mut color = [zero; 3];
     let (mut shown, mut near, mut first) = (zero, zero, zero);
     let mut front = one + one;
+    // Where the front begins, until something farther comes.
+    let mut edge = far;
     let (mut about_u, mut about_v) = (zero, zero);
-    let (mut used, mut full_from) = (order.len(), f32::INFINITY);
-    for (n, &key) in order.iter().enumerate() {
-        #[expect(clippy::cast_possible_truncation, reason = "the low half")]
-        let i = key as u32 as usize;
-        let s = splats.value[S][i];
-        let du = slope_u * s + start_u - splats.value[U][i];
-        let dv = slope_v * s + start_v - splats.value[V][i];
-        let far = du * (du * splats.value[FORM][i] + dv * (2.0 * splats.value[FORM + 1][i]))
-            + dv * dv * splats.value[FORM + 2][i];
-        let inside = (one - far).max(zero);
-        let kernel = inside * inside * (splats.value[WEIGHT][i] * GAIN);
-        let mut part = kernel.min(one - full);
-        let surfel = splats.surfel[i];
-        let shows = surfel < first_hider;
-        let hit = du * splats.value[TILT][i] + dv * splats.value[TILT + 1][i] + s;
-        // Nothing is seen behind where a ray starts; mirrors hide from a little beyond it.
-        let from = if shows { -CONTACT * beam.length } else { clear };
-        let mut mine = zero.lt(part) & (begin + from).le(hit);
-        if !F::<T>::any(mine) {
-            continue;
+    let mut full_from = f32::INFINITY;
+    for (some, order) in groups.chunks_exact(AT_ONCE).zip(order.chunks(AT_ONCE)) {
+        let mut bits = of_group(simd, some, group);
+        while bits != 0 {
+            let key = order[bits.trailing_zeros() as usize];
+            bits &= bits - 1;
+            let (i, depth) = (index(key), depth_of(key));
+            let (batch, lane) = (&splats.batches[i / WIDE], i % WIDE);
+            let value = &batch.value;
+            let s = value[S][lane];
+            let du = slope_u * s + start_u - value[U][lane];
+            let dv = slope_v * s + start_v - value[V][lane];
+            let off = du * (du * value[FORM][lane] + dv * value[FORM + 1][lane])
+                + dv * dv * value[FORM + 2][lane];
+            let inside = (one - off).max(zero);
+            let mut kernel = inside * inside * value[WEIGHT][lane];
+            if batch.early >> lane & 1 != 0 {
+                // Nothing is seen behind where a ray starts; mirrors hide from a little beyond it.
+                let hit = du * value[TILT][lane] + dv * value[TILT + 1][lane] + s;
+                kernel = F::<T>::select((begin + batch.from).le(hit), kernel, zero);
+            }
+            let mut part = kernel.min(one - full);
+            let mine = zero.lt(part);
+            if !F::<T>::any(mine) {
+                continue;
+            }
+            let behind = mine & edge.lt(zero.splat(value[FARTHER][lane]));
+            if F::<T>::any(behind) {
+                let now = F::<T>::select(behind, closed(full, [about_u, about_v]), full);
+                let scale = F::<T>::select(behind, now / full, one);
+                color = [color[0] * scale, color[1] * scale, color[2] * scale];
+                shown *= scale;
+                full = now;
+                front = F::<T>::select(behind, full, front);
+                edge = F::<T>::select(behind, far, edge);
+                part = kernel.min(one - full);
+            }
+            let fresh = mine & full.le(zero);
+            near = F::<T>::select(fresh, zero.splat(depth), near);
+            edge = F::<T>::select(fresh, zero.splat(depth), edge);
+            full += part;
+            let of_front = F::<T>::select(one.lt(front), part, zero);
+            about_u += of_front * (du * value[PER_HALF][lane] + value[SMALL][lane]);
+            about_v += of_front * (dv * value[PER_HALF + 1][lane]);
+            if batch.shows {
+                if describes {
+                    let unseen = zero.lt(part) & shown.le(zero);
+                    #[expect(clippy::cast_possible_truncation, reason = "the low half of a key")]
+                    let number = zero.splat(f32::from_bits(i as u32));
+                    first = F::<T>::select(unseen, number, first);
+                }
+                shown += part;
+                color[0] += part * value[RADIANCE][lane];
+                color[1] += part * value[RADIANCE + 1][lane];
+                color[2] += part * value[RADIANCE + 2][lane];
+            }
+            if !F::<T>::any(full.lt(zero.splat(WHOLE))) {
+                full_from = depth;
+                break;
+            }
         }
-        let depth = splats.value[DEPTH][i];
-        let farther = zero.splat(depth - splats.value[RANGE][i]);
-        let behind = mine & near.lt(farther) & one.lt(front) & zero.lt(full);
-        if F::<T>::any(behind) {
-            let now = F::<T>::select(behind, closed(full, [about_u, about_v]), full);
-            let scale = F::<T>::select(behind, now / full, one);
-            color = [color[0] * scale, color[1] * scale, color[2] * scale];
-            shown *= scale;
-            full = now;
-            front = F::<T>::select(behind, full, front);
-            part = kernel.min(one - full);
-            mine &= zero.lt(part);
-        }
-        part = F::<T>::select(mine, part, zero);
-        let fresh = mine & full.le(zero);
-        near = F::<T>::select(fresh, zero.splat(depth), near);
-        full += part;
-        let of_front = F::<T>::select(one.lt(front), part, zero);
-        about_u += of_front * (du * splats.value[PER_HALF][i] + splats.value[SMALL][i]);
-        about_v += of_front * (dv * splats.value[PER_HALF + 1][i]);
-        if shows {
-            let unseen = mine & shown.le(zero);
-            #[expect(clippy::cast_possible_truncation, reason = "indices of a list of f32")]
-            let index = zero.splat(f32::from_bits(i as u32));
-            first = F::<T>::select(unseen, index, first);
-            shown += part;
-            let c = radiance[surfel as usize];
-            color[0] += part * c.x;
-            color[1] += part * c.y;
-            color[2] += part * c.z;
-        }
-        if !F::<T>::any(full.lt(zero.splat(WHOLE))) {
-            (used, full_from) = (n + 1, depth);
+        if full_from < f32::INFINITY {
             break;
         }
     }
@@ -147,7 +159,6 @@ pub(super) fn blend<T: Simd>(
         near: out(near),
         front: out(front),
         first: out(first),
-        used,
         full_from,
     }
 }

@@ -1,14 +1,21 @@
-//! Blocks: the mirrors' pixels by 4 x 4, each of which walks the trees once for all its rays.
+//! Blocks: the mirrors' pixels by 16 x 16, each of which walks the trees once for all its rays.
 //!
 //! The rays of a block that go on from each other are a [`Beam`]. In the plane of a surfel across the beam's axis each ray lies at a
 //! place that is linear in the plane's distance, so that its distance from the surfel is known without solving for anything, on folds and
-//! caustics as elsewhere. A lane is a pixel. Trees are walked near parts first, until a beam's pixels are full; objects before the mirrors that
-//! may hide what was found. A picture's gaps are closed at the end ([`close`]).
+//! caustics as elsewhere. Trees are walked near parts first ([`walk`]), until a beam's pixels are full; objects before the mirrors that
+//! may hide what was found. Surfels become splats for the whole beam ([`project`]), whose shape bends with the rays ([`bounds`]). Then a
+//! lane is a pixel: each group of 4 x 4 blends the splats that may reach it, by its exact rays ([`blend`]). A picture's gaps are closed at
+//! the end ([`close`]).
 
 mod beam;
 mod blend;
+mod block;
+mod bounds;
 mod close;
+mod fit;
+mod project;
 mod seen;
+mod splats;
 #[cfg(test)]
 mod tests;
 mod walk;
@@ -19,10 +26,11 @@ use fearless_simd::{Simd, dispatch};
 use glam::{DVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
-use self::beam::{BLOCK, Beam, Place, image_near, lanes, seed};
+use self::beam::{Beam, Place, image_near};
+use self::block::{BLOCK, Block, GROUP};
 use self::close::{Layer, Picture, Tile};
-use self::seen::Seen;
-use self::walk::{Splats, Walk, clouds_met};
+use self::seen::{Room, Seen};
+use self::walk::{Walk, clouds_met};
 use super::super::FrameInput;
 use super::cameras::{self, CameraSettings, Top};
 use super::cells::sees_nothing;
@@ -30,6 +38,7 @@ use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::context::Context;
 use crate::error::Result;
 use crate::image::{Planes, Reason};
+use crate::plan::pool::Pool;
 use crate::plan::{GatherCounts, GatherKernel, GatherTimes, Reflection};
 use crate::visibility::mirror_rays::{AREA, RayField, TILE, TILE_PX};
 
@@ -45,8 +54,8 @@ pub(super) struct Kernel<'a> {
 /// Memory of a thread.
 struct Scratch {
     field: Box<RayField>,
-    splats: Splats,
-    order: Vec<u64>,
+    beam: Beam,
+    room: Room,
     met: Vec<Met>,
 }
 
@@ -90,14 +99,18 @@ impl GatherKernel for Kernel<'_> {
         let describes = out.planes.is_some();
         let across = Picture::across(size);
         let count = across * size.height.div_ceil(TILE_PX) as usize;
+        // Rayon's `map_init` would make one for each tile.
+        let spare = Pool::<Option<Box<Scratch>>>::default();
         let done: Vec<Result<Done>> = (0..count)
             .into_par_iter()
             .with_max_len(1)
-            .map_init(Scratch::new, |scratch, tile| {
+            .map(|tile| {
                 cx.check()?;
                 let at = |i: usize| u32::try_from(i).unwrap_or(u32::MAX) * TILE_PX;
                 let origin = [at(tile % across), at(tile / across)];
                 let work = Work { kernel: self, shared: &shared, origin, describes };
+                let mut spare = spare.take();
+                let scratch = spare.get_or_insert_with(Scratch::new);
                 Ok(dispatch!(shared.top.level, simd => work.run(simd, scratch)))
             })
             .collect();
@@ -142,13 +155,13 @@ fn fill_in(picture: Picture<'_>, out: &mut Reflection) {
 }
 
 impl Scratch {
-    fn new() -> Self {
-        Self {
+    fn new() -> Box<Self> {
+        Box::new(Self {
             field: RayField::new(),
-            splats: Splats::default(),
-            order: Vec::new(),
+            beam: Beam::empty(),
+            room: Room::default(),
             met: Vec::new(),
-        }
+        })
     }
 }
 
@@ -204,7 +217,7 @@ impl Work<'_> {
         let (shared, origin) = (self.shared, self.origin);
         let counts = &mut out.counts;
         let mut watch = Watch::new();
-        let Scratch { field, splats, order, met } = scratch;
+        let Scratch { field, beam, room, met } = scratch;
         let shown = field.enter(simd, eye, visibility, origin);
         if shown == [0; TILE] {
             return;
@@ -215,68 +228,88 @@ impl Work<'_> {
             return;
         }
         field.fill(eye, scene, &shown);
-        let width = eye.size.width as usize;
         let nothing =
             || Box::new(Tile { value: [Vec4::ZERO; AREA], layer: [Layer::default(); AREA] });
         let tile = out.tile.get_or_insert_with(nothing);
         for y in (0..TILE).step_by(BLOCK) {
             for x in (0..TILE).step_by(BLOCK) {
-                let mut left = lanes(&shown, [x, y]);
-                while left != 0 {
-                    let seed = seed(left);
-                    let tangent = field.tangent(eye, scene, [x + seed % BLOCK, y + seed / BLOCK]);
-                    let beam = Beam::new(simd, eye, field, &tangent, [x, y], seed, left);
-                    left &= !beam.pixels;
+                let mut block = Block::new(&shown, [x, y]);
+                while let Some(at) = block.seed() {
+                    let tangent = field.tangent(eye, scene, at);
+                    beam.aim(simd, eye, field, &tangent, &block, at);
+                    block.take(&beam.pixels);
                     counts.patches += 1;
-                    self.meet(simd, top, &beam, met);
-                    let mut seen = Seen::new(splats, order, scene, shared.clear);
-                    let mut done = None;
+                    self.meet(simd, top, beam, met);
+                    let mut seen = None;
                     if !met.is_empty() {
                         counts.cameras_ns += watch.lap();
-                        self.walk(simd, &beam, met, &mut seen, counts);
+                        let mut all = Seen::new(simd, room, beam, shared.clear);
+                        self.walk(simd, beam, met, &mut all, counts);
                         counts.walk_ns += watch.lap();
-                        done = (seen.splats.len > 0).then(|| seen.blend(simd, &beam));
-                    }
-                    let mut pixels = beam.pixels;
-                    while pixels != 0 {
-                        let lane = pixels.trailing_zeros() as usize;
-                        pixels &= pixels - 1;
-                        let [row, column] = [y + lane / BLOCK, x + lane % BLOCK];
-                        let at = row * TILE + column;
-                        let Some(done) = &done else {
-                            tile.layer[at].open = 1.0;
-                            continue;
-                        };
-                        tile.layer[at] = done.layer(lane);
-                        if done.shown[lane] <= 0.0 {
-                            continue;
-                        }
-                        tile.value[at] = done.value(lane);
-                        if self.describes {
-                            let first = done.first[lane].to_bits() as usize;
-                            let place = beam.place(seen.splats.place(first));
-                            let tangent = field.tangent(eye, scene, [column, row]);
-                            let image = image_near(eye, field, &tangent, [column, row], place);
-                            let (off, lambda) = image.unwrap_or_default();
-                            let px = [origin[0] as usize + column, origin[1] as usize + row];
-                            out.shown.push(Shown {
-                                pixel: px[1] * width + px[0],
-                                surfel: seen.splats.surfel[first],
-                                #[expect(clippy::cast_possible_truncation, reason = "to be kept")]
-                                lambda: lambda as f32,
-                                splat: (DVec2::new(px[0] as f64 + 0.5, px[1] as f64 + 0.5) + off)
-                                    .as_vec2()
-                                    .to_array(),
-                            });
+                        if !all.order.is_empty() {
+                            all.sort();
+                            seen = Some(all);
                         }
                     }
-                    if done.is_some() {
+                    for (group, own) in beam.pixels.into_iter().enumerate() {
+                        if own == 0 {
+                            continue;
+                        }
+                        let corner = block.corner_of(group);
+                        let done =
+                            seen.as_ref().map(|seen| seen.blend(simd, beam, group, self.describes));
+                        for lane in bits(own) {
+                            let [column, row] =
+                                [corner[0] + lane % GROUP, corner[1] + lane / GROUP];
+                            let at = row * TILE + column;
+                            let Some(done) = &done else {
+                                tile.layer[at].open = 1.0;
+                                continue;
+                            };
+                            tile.layer[at] = done.layer(lane);
+                            if done.shown[lane] > 0.0 {
+                                tile.value[at] = done.value(lane);
+                            }
+                        }
+                        if let (true, Some(seen), Some(done)) = (self.describes, &seen, &done) {
+                            for lane in bits(own).filter(|lane| done.shown[*lane] > 0.0) {
+                                let px = [corner[0] + lane % GROUP, corner[1] + lane / GROUP];
+                                let first = done.first[lane].to_bits() as usize;
+                                out.shown.push(self.shown(field, beam, seen, px, first));
+                            }
+                        }
+                    }
+                    if seen.is_some() {
                         counts.splat_ns += watch.lap();
                     }
                 }
             }
         }
         counts.cameras_ns += watch.lap();
+    }
+
+    /// What a pixel (column and row of the tile) shows first: a splat of a beam.
+    fn shown(
+        &self,
+        field: &mut RayField,
+        beam: &Beam,
+        seen: &Seen<'_>,
+        [column, row]: [usize; 2],
+        splat: usize,
+    ) -> Shown {
+        let FrameInput { scene, eye, .. } = self.kernel.frame;
+        let place = beam.place(seen.splats.place(splat));
+        let tangent = field.tangent(eye, scene, [column, row]);
+        let image = image_near(eye, field, &tangent, [column, row], place);
+        let (off, lambda) = image.unwrap_or_default();
+        let px = [self.origin[0] as usize + column, self.origin[1] as usize + row];
+        Shown {
+            pixel: px[1] * eye.size.width as usize + px[0],
+            surfel: seen.splats.surfel(splat),
+            #[expect(clippy::cast_possible_truncation, reason = "to be kept")]
+            lambda: lambda as f32,
+            splat: (DVec2::new(px[0] as f64 + 0.5, px[1] as f64 + 0.5) + off).as_vec2().to_array(),
+        }
     }
 
     /// The objects that a beam may meet, from the nearest on.
@@ -307,7 +340,7 @@ impl Work<'_> {
             }
             self.walk_cloud(simd, beam, met.cloud, [first, f32::MAX], seen, counts);
         }
-        if !self.kernel.settings.mirror_occlusion || seen.splats.len == 0 {
+        if !self.kernel.settings.mirror_occlusion || seen.order.is_empty() {
             return;
         }
         met.clear();
@@ -348,9 +381,11 @@ impl Work<'_> {
             frame,
             cloud,
             surfels: &scene.surfels,
+            looks: &scene.looks,
             range: [first * k, last.min(seen.full_from) * k],
             detail: shared.detail,
             front_only: cloud.closed && (leaves || !inside),
+            hides,
         };
         counts.cameras += 1;
         walk.run(simd, seen, counts);
@@ -376,6 +411,15 @@ fn add_met<S: Simd>(
             met.push(Met { near: near[slot], cloud: first + g * CHILDREN + slot });
         }
     }
+}
+
+/// The numbers of the bits that are set.
+fn bits(mut of: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let next = (of != 0).then_some(of.trailing_zeros() as usize);
+        of &= of.wrapping_sub(1);
+        next
+    })
 }
 
 /// Time since the last lap.

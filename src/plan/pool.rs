@@ -5,11 +5,11 @@ use std::sync::Mutex;
 
 /// A stock of reusable values.
 #[derive(Default)]
-pub struct Pool<T>(Mutex<Vec<T>>);
+pub(crate) struct Pool<T>(Mutex<Vec<T>>);
 
 impl<T: Default> Pool<T> {
     /// Takes one from the stock, or makes one.
-    pub fn take(&self) -> Pooled<'_, T> {
+    pub(crate) fn take(&self) -> Pooled<'_, T> {
         let value = self.lock().pop().unwrap_or_default();
         Pooled { pool: self, value }
     }
@@ -21,7 +21,7 @@ impl<T: Default> Pool<T> {
 }
 
 /// Goes back to its pool when dropped.
-pub struct Pooled<'a, T: Default> {
+pub(crate) struct Pooled<'a, T: Default> {
     pool: &'a Pool<T>,
     value: T,
 }
