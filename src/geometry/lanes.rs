@@ -161,6 +161,10 @@ pub trait Vector<S: Simd>: Real<Scalar = f32> {
     fn load(simd: S, slice: &[f32]) -> Self;
     /// Into the first `LANES` elements of `slice`.
     fn store(self, slice: &mut [f32]);
+    /// The least lane. None may be NaN; of both zeros it is either.
+    fn least(self) -> f32;
+    /// The largest, likewise.
+    fn most(self) -> f32;
     /// Bit i = lane i.
     fn bits(mask: Self::Mask) -> u64;
     /// Lane i = bit i.
@@ -236,6 +240,14 @@ macro_rules! vector_of_floats {
             #[inline(always)]
             fn store(self, slice: &mut [f32]) {
                 self.store_slice(&mut slice[..$n]);
+            }
+            #[inline(always)]
+            fn least(self) -> f32 {
+                self.reduce_min()
+            }
+            #[inline(always)]
+            fn most(self) -> f32 {
+                self.reduce_max()
             }
             #[inline(always)]
             fn bits(mask: Self::Mask) -> u64 {
@@ -402,6 +414,14 @@ impl<S: Simd, V: Vector<S>> Vector<S> for Pair<V> {
     fn store(self, slice: &mut [f32]) {
         self.0.store(slice);
         self.1.store(&mut slice[V::LANES as usize..]);
+    }
+    #[inline(always)]
+    fn least(self) -> f32 {
+        self.0.least().min(self.1.least())
+    }
+    #[inline(always)]
+    fn most(self) -> f32 {
+        self.0.most().max(self.1.most())
     }
     #[inline(always)]
     fn bits(mask: Self::Mask) -> u64 {

@@ -216,12 +216,12 @@ impl Beam {
             widest = widest.max(angle);
         }
         for k in 0..2 {
-            self.starts[k] = [least::<S>(lows[k][0]), -least::<S>(-highs[k][0])];
-            self.slopes[k] = [least::<S>(lows[k][1]), -least::<S>(-highs[k][1])];
+            self.starts[k] = [lows[k][0].least(), highs[k][0].most()];
+            self.slopes[k] = [lows[k][1].least(), highs[k][1].most()];
         }
-        self.first = least::<S>(first);
-        self.last = -least::<S>(-last);
-        self.spread = (-least::<S>(-widest)).sqrt();
+        self.first = first.least();
+        self.last = last.most();
+        self.spread = widest.most().sqrt();
     }
 
     /// The scene's place at u, v, s.
@@ -307,21 +307,6 @@ impl Place {
 }
 
 type F<S> = f32x16<S>;
-
-/// The least of all lanes.
-#[inline(always)]
-pub(super) fn least<S: Simd>(values: F<S>) -> f32 {
-    let mut low = [0.0f32; LANES];
-    Vector::<S>::store(values, &mut low);
-    let mut half = LANES / 2;
-    while half > 0 {
-        for i in 0..half {
-            low[i] = low[i].min(low[i + half]);
-        }
-        half /= 2;
-    }
-    low[0]
-}
 
 /// By lane.
 pub(super) const COLUMNS: [f32; LANES] =

@@ -3,7 +3,7 @@
 use fearless_simd::{Simd, f32x16};
 use glam::{Mat3, Vec3};
 
-use super::beam::{Beam, COLUMNS, ROWS, Rays, least};
+use super::beam::{Beam, COLUMNS, ROWS, Rays};
 use super::block::{GROUP, GROUPS, LANES, SIDE};
 use crate::geometry::lanes::{Real, Vector};
 
@@ -45,10 +45,10 @@ impl Beam {
             for k in 0..2 {
                 let start = F::<S>::load(simd, &self.rays[group].start[k]);
                 let slope = F::<S>::load(simd, &self.rays[group].slope[k]);
-                ranges.starts[k][0][group] = least::<S>(F::<S>::select(own, start, far));
-                ranges.starts[k][1][group] = -least::<S>(F::<S>::select(own, -start, far));
-                ranges.slopes[k][0][group] = least::<S>(F::<S>::select(own, slope, far));
-                ranges.slopes[k][1][group] = -least::<S>(F::<S>::select(own, -slope, far));
+                ranges.starts[k][0][group] = F::<S>::select(own, start, far).least();
+                ranges.starts[k][1][group] = F::<S>::select(own, start, -far).most();
+                ranges.slopes[k][0][group] = F::<S>::select(own, slope, far).least();
+                ranges.slopes[k][1][group] = F::<S>::select(own, slope, -far).most();
             }
         }
         ranges
@@ -60,14 +60,17 @@ impl Beam {
         let zero = F::<S>::broadcast(simd, 0.0);
         let mut squares = [[zero; 3]; 3];
         let mut sums = [[zero; 3]; 4];
-        let mut ends = [zero; 4];
+        let mut ends = [[zero; 2]; 2];
         for group in (0..GROUPS).filter(|group| self.pixels[*group] != 0) {
             let own = F::<S>::mask(simd, u64::from(self.pixels[group]));
             let [x, y] = [group % SIDE * GROUP, group / SIDE * GROUP];
             let dx = F::<S>::load(simd, &COLUMNS) + (x as f32 - self.at[0]);
             let dy = F::<S>::load(simd, &ROWS) + (y as f32 - self.at[1]);
             let (ox, oy) = (F::<S>::select(own, dx, zero), F::<S>::select(own, dy, zero));
-            ends = [ends[0].min(ox), ends[1].min(-ox), ends[2].min(oy), ends[3].min(-oy)];
+            ends = [
+                [ends[0][0].min(ox), ends[0][1].max(ox)],
+                [ends[1][0].min(oy), ends[1][1].max(oy)],
+            ];
             let by = [dx * dx * 0.5, dx * dy, dy * dy * 0.5];
             let by = [
                 F::<S>::select(own, by[0], zero),
@@ -110,8 +113,8 @@ impl Beam {
             start: [solve(sums[0]), solve(sums[1])],
             slope: [solve(sums[2]), solve(sums[3])],
             pixels: [
-                [least::<S>(ends[0]), -least::<S>(ends[1])],
-                [least::<S>(ends[2]), -least::<S>(ends[3])],
+                [ends[0][0].least(), ends[0][1].most()],
+                [ends[1][0].least(), ends[1][1].most()],
             ],
         }
     }

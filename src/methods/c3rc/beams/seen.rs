@@ -36,7 +36,7 @@ pub(super) struct Seen<'a> {
     /// Nothing that lies farther is seen by any.
     pub(super) full_from: f32,
     /// Whether some group is full.
-    pub(super) hides: bool,
+    pub(super) some_full: bool,
     /// Mirrors hide from that far on along a ray.
     pub(super) clear: f32,
 }
@@ -56,7 +56,7 @@ impl<'a> Seen<'a> {
             full: beam.pixels.map(|pixels| if pixels == 0 { f32::MIN } else { f32::INFINITY }),
             until: FIRST_LOOK * pixels,
             full_from: f32::INFINITY,
-            hides: false,
+            some_full: false,
             clear,
         }
     }
@@ -75,7 +75,7 @@ impl<'a> Seen<'a> {
         for group in (0..GROUPS).filter(|group| beam.pixels[*group] != 0) {
             if self.full[group] == f32::INFINITY {
                 self.full[group] = self.blend(simd, beam, group, false).full_from;
-                self.hides |= self.full[group] < f32::INFINITY;
+                self.some_full |= self.full[group] < f32::INFINITY;
             }
             most = most.max(self.full[group]);
         }

@@ -61,7 +61,7 @@ impl Walk<'_> {
             top -= 1;
             let (near, at, groups) = stack[top];
             if near > self.range[1]
-                || (seen.hides && groups & seen.open_at(simd, near / self.frame.per_scene) == 0)
+                || (seen.some_full && groups & seen.open_at(simd, near / self.frame.per_scene) == 0)
             {
                 continue;
             }
