@@ -256,8 +256,11 @@ impl Work<'_> {
                             continue;
                         }
                         let corner = block.corner_of(group);
-                        let done =
-                            seen.as_ref().map(|seen| seen.blend(simd, beam, group, self.describes));
+                        // Not `map`: what a closure does may be compiled for no instruction set in particular.
+                        let done = match &seen {
+                            Some(seen) => Some(seen.blend(simd, beam, group, self.describes)),
+                            None => None,
+                        };
                         for lane in bits(own) {
                             let [column, row] =
                                 [corner[0] + lane % GROUP, corner[1] + lane / GROUP];

@@ -6,13 +6,13 @@ use super::CONTACT;
 use super::bounds::{Bounds, at, dots};
 use super::seen::{Seen, key};
 use super::splats::{
-    FARTHER, FORM, PER_HALF, RADIANCE, S, SMALL, Splats, TILT, U, V, WEIGHT, WIDE, next,
+    FARTHER, FORM, PER_HALF, RADIANCE, S, SIZE, SPREAD, Splats, TILT, U, V, WEIGHT, WIDE, next,
 };
 use super::walk::Walk;
 use crate::accel::kd_tree::CHILDREN;
 use crate::geometry::lanes::{Real, Vector};
 use crate::geometry::look::{Look, unpacked_normals};
-use crate::plan::kernel::{GAIN, LARGE, LEAST_FACING, PER_DISK, PIXEL, SAME_SURFACE_RADII, SPREAD};
+use crate::plan::kernel::{LEAST_FACING, PER_DISK, PIXEL, SAME_SURFACE_RADII};
 use crate::plan::{EVENNESS, GatherCounts};
 
 type F<T> = f32x8<T>;
@@ -148,8 +148,6 @@ impl Walk<'_> {
             // Its size in pixels.
             let area = (gux * gvy - guy * gvx).abs() * root;
             let size = (one / area.max(zero.splat(f32::MIN_POSITIVE))).sqrt();
-            let small =
-                ((zero.splat(LARGE[1]) - size) * (1.0 / (LARGE[1] - LARGE[0]))).max(zero).min(one);
             let k = 1.0 / self.frame.per_scene;
             let square = self.frame.per_scene * self.frame.per_scene;
             let per_det = per_det * square;
@@ -165,6 +163,9 @@ impl Walk<'_> {
             #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
             let early = G::<T>::bits(nearest.lt(zero.splat(self.beam.last + from))) as u32;
             batch.early = early;
+            #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+            let back = G::<T>::bits(zero.lt(along)) as u32;
+            batch.back = back;
             batch.surfel.copy_from_slice(&near.surfel[..WIDE]);
             let value = &mut batch.value;
             let mut values = [zero; RADIANCE];
@@ -172,10 +173,10 @@ impl Walk<'_> {
             values[FORM] = yy * per_det;
             values[FORM + 1] = xy * per_det * -2.0;
             values[FORM + 2] = xx * per_det;
-            values[WEIGHT] = root * squared * aslant * thin * (3.0 * PER_DISK * GAIN);
+            values[WEIGHT] = root * squared * aslant * thin * (3.0 * PER_DISK);
             (values[PER_HALF], values[PER_HALF + 1]) = (one / reach[0], one / reach[1]);
             values[FARTHER] = depth - squared.sqrt() * (SAME_SURFACE_RADII * k);
-            values[SMALL] = small;
+            values[SIZE] = size;
             (values[TILT], values[TILT + 1]) = (tilt_u, tilt_v);
             for (list, values) in value.iter_mut().zip(values) {
                 Vector::<T>::store(values, list);

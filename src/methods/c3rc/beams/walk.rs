@@ -5,12 +5,13 @@ use fearless_simd::{Simd, f32x8, f32x16};
 use super::beam::{Beam, Frame};
 use super::bounds::{Bounds, dots};
 use super::seen::Seen;
+use super::splats::SPREAD;
 use crate::accel::kd_tree::representatives::{PAIRS, QUADS, REPRESENTATIVES};
 use crate::accel::kd_tree::{CHILDREN, WideNode};
 use crate::geometry::Surfels;
 use crate::geometry::lanes::{Real, Vector, dot_const};
 use crate::geometry::look::Look;
-use crate::plan::kernel::{AGREEING, BETWEEN, LEAST_NODE_FACING, SPREAD};
+use crate::plan::kernel::{AGREEING, BETWEEN, LEAST_NODE_FACING};
 use crate::plan::{EVENNESS, GatherCounts};
 use crate::scene::prepared::Cloud;
 
