@@ -156,7 +156,8 @@ impl<R: Real<Scalar = f32>> Side<R> {
         let total = self.total.min(one);
         let inward = (total - 0.5) * PER_TOTAL + (-off + EDGE) * PER_OFF;
         let edge = (inward * size + 0.5).max(zero).min(one);
-        let some = ((total - SOME[0]) * (1.0 / (SOME[1] - SOME[0]))).max(zero).min(one);
+        let many = total * size * size * (1.0 / (LEAST_SIZE * LEAST_SIZE));
+        let some = ((many - SOME[0]) * (1.0 / (SOME[1] - SOME[0]))).max(zero).min(one);
         total + (edge - total) * some
     }
 }

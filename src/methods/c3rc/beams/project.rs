@@ -18,16 +18,14 @@ use crate::plan::{EVENNESS, GatherCounts};
 type F<T> = f32x8<T>;
 
 impl Walk<'_> {
-    /// Keeps those of eight surfels from `first` on that `lanes` names and that lie near the beam. Each stands for `each`.
+    /// Keeps those of eight surfels from `first` on that `lanes` names and that lie near the beam.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "an inner loop: all of it in registers")]
     pub(super) fn look<T: Simd>(
         &self,
         simd: T,
         b: &Bounds,
         first: u32,
         lanes: u64,
-        each: u32,
         seen: &mut Seen<'_>,
         counts: &mut GatherCounts,
     ) {
@@ -43,7 +41,7 @@ impl Walk<'_> {
         let [u, v, s] = dots(q, &self.frame.axes);
         let zero = F::<T>::broadcast(simd, 0.0);
         let extent = F::<T>::load(simd, &self.surfels.extent[i..]);
-        let squared = extent * extent * (EVENNESS * EVENNESS * each as f32);
+        let squared = extent * extent * (EVENNESS * EVENNESS);
         let disk = squared * (SPREAD * SPREAD);
         // No kernel is larger than this: seen aslant it is cut longer.
         let disk = disk * (1.0 + b.steepest * b.steepest);

@@ -82,7 +82,7 @@ impl Walk<'_> {
             let nearest = boxes[0];
             let single = bits & small[0];
             if single != 0 {
-                self.look(simd, &bounds, own, single, 1, seen, counts);
+                self.look(simd, &bounds, own, single, seen, counts);
                 bits &= !single;
             }
             let from = top;
@@ -94,17 +94,13 @@ impl Walk<'_> {
                 let four = small[2] >> slot & 1 != 0;
                 let eight = small[3] >> slot & 1 != 0;
                 if child == 0 {
-                    let (each, every) = match (two, four) {
-                        (true, _) => (4, 0x11),
-                        (_, true) => (2, 0x55),
-                        _ => (1, 0xff),
-                    };
+                    // All: some of them would leave gaps.
                     let first = self.cloud.surfels.start + node.first[slot];
                     let mut done = 0;
                     while done < node.count[slot] {
                         let some = (node.count[slot] - done).min(WIDTH);
-                        let lanes = ((1u64 << some) - 1) & every;
-                        self.look(simd, &bounds, first + done, lanes, each, seen, counts);
+                        let lanes = (1u64 << some) - 1;
+                        self.look(simd, &bounds, first + done, lanes, seen, counts);
                         done += some;
                     }
                 } else if two || four || eight {
@@ -115,7 +111,7 @@ impl Walk<'_> {
                         (_, true) => (PAIRS, used.div_ceil(2)),
                         _ => (0, used),
                     };
-                    self.look(simd, &bounds, parts + offset, (1 << count) - 1, 1, seen, counts);
+                    self.look(simd, &bounds, parts + offset, (1 << count) - 1, seen, counts);
                 } else {
                     // The nearest on top.
                     let mut to = top;
@@ -150,7 +146,7 @@ impl Walk<'_> {
         let range = self.cloud.surfels.clone();
         for first in range.clone().step_by(CHILDREN) {
             let some = (range.end - first).min(WIDTH);
-            self.look(simd, &bounds, first, (1 << some) - 1, 1, seen, counts);
+            self.look(simd, &bounds, first, (1 << some) - 1, seen, counts);
         }
         if seen.splats.near.len > 0 {
             self.take(simd, &bounds, seen, counts);
