@@ -2,7 +2,7 @@
 
 /// The kernel of a disk is so many times as wide as the disk that holds a surfel. With 1.3 the squared error was larger by a fifth:
 /// fewer splats a pixel tell less of where edges are.
-pub(super) const SPREAD: f32 = 1.7;
+pub(super) const SPREAD: f32 = 1.5;
 
 /// Splats, sixteen by sixteen.
 #[derive(Default)]
