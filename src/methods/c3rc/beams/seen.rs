@@ -10,7 +10,7 @@ use super::splats::{Splats, WIDE};
 use crate::geometry::lanes::{Real, Vector};
 
 /// Splats a pixel before it is asked whether they fill the beam (untuned).
-const FIRST_LOOK: usize = 24;
+const FIRST_LOOK: usize = 40;
 
 /// Memory of a thread for what a beam sees.
 #[derive(Default)]

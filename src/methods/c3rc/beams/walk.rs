@@ -212,7 +212,7 @@ impl Walk<'_> {
         let seen = area * BETWEEN;
         let real = zero.lt(extent);
         let small = [
-            F::<T>::bits(needed.le(seen) & real),
+            F::<T>::bits(needed.le(seen * 1.2) & real),
             F::<T>::bits(needed.le(seen * 2.0) & real),
             F::<T>::bits(needed.le(seen * 4.0) & real),
             F::<T>::bits(needed.le(seen * 6.0) & real),
