@@ -64,11 +64,11 @@ fn out<T: Simd>(v: F<T>) -> [f32; LANES] {
 
 /// What splats that are seen from one side tell of pixels: sums of what each covers, as its area says, and of that times where it
 /// lies about the pixel, in its own size, and times that size, in pixels.
-#[derive(Clone, Copy)]
-struct Side<R> {
-    total: R,
-    about: [R; 2],
-    size: R,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Side<R> {
+    pub(super) total: R,
+    pub(super) about: [R; 2],
+    pub(super) size: R,
 }
 
 /// Pixels of a group, a lane a pixel, while splats come.
@@ -147,7 +147,7 @@ impl<R: Real<Scalar = f32>> Side<R> {
     /// The part of a pixel that is covered. An edge lies in the pixel about where what splats cover and how far to one side they lie
     /// say. The former alone would blur edges over splats, and show gaps where splats are not spread evenly.
     #[inline(always)]
-    fn covered(&self) -> R {
+    pub(super) fn covered(&self) -> R {
         let (one, zero) = (self.total.splat(1.0), self.total.splat(0.0));
         let per_total = one / self.total.max(zero.splat(f32::MIN_POSITIVE));
         let [u, v] = self.about;
@@ -224,6 +224,9 @@ pub(super) fn blend<T: Simd>(
                     break;
                 }
                 mine &= pixels.open;
+                if !F::<T>::any(mine) {
+                    continue;
+                }
             }
             let kernel = F::<T>::select(mine, kernel, zero);
             let fresh = mine & pixels.weight.le(zero);

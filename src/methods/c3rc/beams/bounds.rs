@@ -19,8 +19,8 @@ pub(super) struct Bounds {
     pub(super) width: [f32; 2],
     pub(super) width_per_s: [f32; 2],
     pub(super) absolute: [[f32; 3]; 3],
-    /// Slopes are taken for no steeper (untuned).
-    pub(super) steepest: f32,
+    /// No disk is seen by more than this, squared, longer than it is: slopes are taken for no steeper than that has it (untuned).
+    pub(super) longer: f32,
     pub(super) gaze: [f32; 2],
 }
 
@@ -56,7 +56,7 @@ impl Bounds {
             width: [0, 1].map(|axis| row(b.step[axis], bend.start[axis]) * k),
             width_per_s: [0, 1].map(|axis| row(b.step_per_s[axis], bend.slope[axis])),
             absolute: frame.axes.map(|e| e.map(f32::abs)),
-            steepest: 1.2 * b.spread + 0.01,
+            longer: 1.0 + (1.2 * b.spread + 0.01).powi(2),
             gaze: [cosine - 1e-5, (1.0 - cosine * cosine).max(0.0).sqrt() + 1e-5],
         }
     }

@@ -44,9 +44,10 @@ impl Walk<'_> {
         let squared = extent * extent * (EVENNESS * EVENNESS);
         let disk = squared * (SPREAD * SPREAD);
         // No kernel is larger than this: seen aslant it is cut longer.
-        let disk = disk * (1.0 + b.steepest * b.steepest);
-        let pixel_u = s * b.width_per_s[0] + b.width[0];
-        let pixel_v = s * b.width_per_s[1] + b.width[1];
+        let disk = disk * b.longer;
+        let along = s.abs();
+        let pixel_u = along * b.width_per_s[0] + b.width[0];
+        let pixel_v = along * b.width_per_s[1] + b.width[1];
         let low_u = at(s, b.slopes[0][0], b.starts[0][0]) - u;
         let high_u = u - at(s, b.slopes[0][1], b.starts[0][1]);
         let low_v = at(s, b.slopes[1][0], b.starts[1][0]) - v;

@@ -4,11 +4,11 @@ use fearless_simd::dispatch;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::beam::{Beam, Place, Rays};
-use super::blend::blend;
+use super::blend::{Side, blend};
 use super::block::{BLOCK, Block, GROUP, GROUPS, LANES, SIDE};
 use super::close::{self, Layer, Tile};
 use super::seen::{AT_ONCE, Room, Seen, key};
-use super::splats::{FARTHER, FORM, PER_HALF, RADIANCE, SMALL, Splats, WEIGHT, WIDE};
+use super::splats::{FARTHER, FORM, PER_HALF, RADIANCE, SIZE as HALF_SIZE, Splats, WEIGHT, WIDE};
 use super::walk::Walk;
 use crate::camera::Eye;
 use crate::camera::eye::ImageSize;
@@ -18,7 +18,6 @@ use crate::error::Error;
 use crate::frame::Renderer;
 use crate::geometry::lanes::simd_level;
 use crate::methods::{FrameInput, Method, Params, c3rc::C3rc};
-use crate::plan::kernel::GAIN;
 use crate::plan::{GatherCounts, Pass, Plan, Reflection};
 use crate::scene::description::{Environment, EyeDescription};
 use crate::scene::{GivenSurfels, PreparedScene, builtin};
@@ -242,8 +241,55 @@ fn steps_bend_with_the_mirror() {
     assert!(bent < 0.6 * straight, "{bent} and {straight}");
 }
 
-/// A beam of parallel rays a unit apart, and round splats in it: u, v, radius, weight in the middle, depth.
-fn drawn(list: &[[f32; 5]], first_hider: u32) -> super::blend::Blended {
+/// What a surface's splats of one size (half of it in pixels) tell of a pixel whose middle lies so many pixels inside its edge.
+fn at_edge(inside: f64, half: f64) -> Side<f64> {
+    let mut side = Side { total: 0.0, about: [0.0; 2], size: 0.0 };
+    let steps = 200;
+    for (x, y) in (0..steps * steps).map(|i| (i % steps, i / steps)) {
+        let [x, y] = [x, y].map(|i| (f64::from(i) + 0.5) / f64::from(steps) * 2.0 - 1.0);
+        let kernel = (1.0 - x * x - y * y).max(0.0).powi(2);
+        if x * half > -inside {
+            side.total += kernel;
+            side.about[0] += kernel * x;
+        }
+    }
+    // All of the kernel is 1.
+    let each = 4.0 / f64::from(steps * steps) * 3.0 / std::f64::consts::PI;
+    Side { total: side.total * each, about: [side.about[0] * each, 0.0], size: side.total * each * half }
+}
+
+#[test]
+fn coverage_is_that_of_an_edge() {
+    for half in [1.5, 2.0, 4.0] {
+        for i in -10..=10 {
+            let inside = f64::from(i) * 0.1;
+            let truth = (0.5 + inside).clamp(0.0, 1.0);
+            let found = covered(&at_edge(inside, half));
+            let off = (found - truth).abs();
+            assert!(off < 0.13 + 0.025 * half, "{half} px, {inside} px inside: {found}");
+        }
+    }
+    // What large splats cover is blurred over them.
+    let blurred = at_edge(-1.0, 4.0);
+    assert!(blurred.total > 0.2 && covered(&blurred) < 0.02, "{blurred:?}");
+    // In a surface, where splats happen to lie apart.
+    assert_eq!(covered(&Side { total: 0.7, about: [0.05, 0.0], size: 1.05 }), 1.0);
+    // A thin thing, or nearly nothing.
+    assert_eq!(covered(&Side { total: 0.1, about: [0.0; 2], size: 0.1 }), 0.1);
+    assert_eq!(covered(&Side { total: 0.0, about: [0.0; 2], size: 0.0 }), 0.0);
+}
+
+fn covered(side: &Side<f64>) -> f64 {
+    #[expect(clippy::cast_possible_truncation, reason = "as it is used")]
+    let of = |x: f64| x as f32;
+    let Side { total, about: [u, v], size } = *side;
+    let side = Side { total: of(total), about: [of(u), of(v)], size: of(size) };
+    f64::from(side.covered())
+}
+
+/// A beam of parallel rays a unit apart, and round splats in it: u, v, radius, weight in the middle, depth. From numbers on they
+/// hide, and are seen from behind.
+fn drawn(list: &[[f32; 5]], first_hider: u32, first_back: u32) -> super::blend::Blended {
     const COLORS: [Vec3; 4] = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
     let (scene, eye) = scene("plane");
     let mut beam = None;
@@ -263,10 +309,11 @@ fn drawn(list: &[[f32; 5]], first_hider: u32) -> super::blend::Blended {
         let surfel = u32::try_from(i).unwrap();
         splats.push([u, v, depth], surfel, |batch| {
             batch.shows = surfel < first_hider;
+            batch.back = u32::from(surfel >= first_back);
             (batch.early, batch.from) = if batch.shows { (0, 0.0) } else { (1, 0.1) };
             let value = &mut batch.value;
-            value[WEIGHT][0] = weight * GAIN;
-            (value[FARTHER][0], value[SMALL][0]) = (depth - 0.5, 1.0);
+            value[WEIGHT][0] = weight;
+            (value[FARTHER][0], value[HALF_SIZE][0]) = (depth - 0.5, 1.0);
             (value[FORM][0], value[FORM + 1][0], value[FORM + 2][0]) = (form, 0.0, form);
             (value[PER_HALF][0], value[PER_HALF + 1][0]) = (1.0 / radius, 1.0 / radius);
             for (k, channel) in COLORS[i].to_array().into_iter().enumerate() {
@@ -283,28 +330,34 @@ fn drawn(list: &[[f32; 5]], first_hider: u32) -> super::blend::Blended {
 
 #[test]
 fn the_nearest_fill_a_pixel_and_the_rest_shows_through() {
-    let parts = [
-        [1.0, 1.0, 0.4, 9.0, 3.0],
-        [1.0, 1.0, 0.4, 0.25 / GAIN, 1.0],
-        [1.0, 1.0, 0.4, 0.5 / GAIN, 2.0],
-    ];
+    let parts =
+        [[1.0, 1.0, 0.4, 9.0, 3.0], [1.0, 1.0, 0.4, 0.125, 1.0], [1.0, 1.0, 0.4, 0.125, 2.0]];
+    // What one of the two covers, and both.
+    let of = |total: f32| Side { total, about: [0.0; 2], size: total }.covered();
+    let [one, both] = [of(0.125), of(0.25)];
+    assert!(0.1 < one && one < both && both < 0.9, "{one} and {both}");
     let lane = GROUP + 1;
-    let is = |list: &[[f32; 5]], hider: u32, color: [f32; 3], shown: f32| {
-        let done = drawn(list, hider);
+    let is = |list: &[[f32; 5]], hider: u32, back: u32, color: [f32; 3], shown: f32| {
+        let done = drawn(list, hider, back);
         let off = (done.value(lane).truncate() - Vec3::from_array(color)).abs().max_element();
         assert!(off < 1e-6 && (done.shown[lane] - shown).abs() < 1e-6, "{done:?}");
         assert!((0..LANES).all(|l| l == lane || done.full[l] == 0.0), "its neighbours are empty");
         done
     };
-    let done = is(&parts, 9, [0.25, 0.25, 0.5], 1.0);
+    let done = is(&parts, 9, 9, [1.0 - both, one, both - one], 1.0);
     assert_eq!(done.first[lane].to_bits() as usize, WIDE, "the nearest");
-    is(&parts[1..2], 9, [0.25, 0.0, 0.0], 0.25);
+    is(&parts[1..2], 9, 9, [one, 0.0, 0.0], one);
     // The last two are a mirror's: they hide and show nothing.
-    is(&parts, 1, [0.25, 0.0, 0.0], 0.25);
+    is(&parts, 1, 9, [1.0 - both, 0.0, 0.0], 1.0 - both);
     // A mirror hides nothing nearer than its clearance.
-    is(&[[1.0, 1.0, 0.4, 9.0, 3.0], [1.0, 1.0, 0.4, 9.0, 0.05]], 1, [1.0, 0.0, 0.0], 1.0);
+    let near = [[1.0, 1.0, 0.4, 9.0, 3.0], [1.0, 1.0, 0.4, 9.0, 0.05]];
+    is(&near, 1, 9, [1.0, 0.0, 0.0], 1.0);
+    // One surface, and its other side: this covers no more of the pixel, however near it is.
+    let sides = [[1.0, 1.0, 0.4, 0.125, 1.0], [1.0, 1.0, 0.4, 0.125, 1.1]];
+    is(&sides, 9, 9, [both * 0.5, both * 0.5, 0.0], both);
+    is(&sides, 9, 1, [one, 0.0, 0.0], one);
     // Where the front is full, that is known, and up to where.
-    let done = drawn(&[[1.5, 1.5, 99.0, 9.0, 2.0], [1.0, 1.0, 0.4, 9.0, 3.0]], 9);
+    let done = drawn(&[[1.5, 1.5, 99.0, 9.0, 2.0], [1.0, 1.0, 0.4, 9.0, 3.0]], 9, 9);
     assert_eq!(done.full_from, 2.0);
 }
 

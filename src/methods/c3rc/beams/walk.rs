@@ -179,6 +179,8 @@ impl Walk<'_> {
         };
         let disk = extent.min(coarse.max(zero.splat(self.cloud.extent)));
         let disk = disk * (SPREAD * EVENNESS);
+        // Rays of a bent mirror also start before the first one does.
+        let farthest = near.abs().max(far.abs());
         // A disk reaches beyond its middle also along the axis.
         let mut meets = near.le(far + disk);
         for k in 0..2 {
@@ -186,8 +188,9 @@ impl Walk<'_> {
             let [t0, t1] = b.slopes[k];
             let low = (near * t0).min(far * t0) + s0;
             let high = (near * t1).max(far * t1) + s1;
-            let pixel = far * b.width_per_s[k] + b.width[k];
-            let reach = half[k] + (disk * disk + pixel * pixel).sqrt();
+            let pixel = farthest * b.width_per_s[k] + b.width[k];
+            // Seen aslant a disk is cut longer.
+            let reach = half[k] + (disk * disk * b.longer + pixel * pixel).sqrt();
             let (least, most) = (middle[k] - reach, middle[k] + reach);
             Vector::<T>::store(least, &mut boxes[2 + 2 * k]);
             Vector::<T>::store(most, &mut boxes[3 + 2 * k]);
