@@ -7,9 +7,7 @@ use super::beam::{Beam, Rays};
 use super::block::LANES;
 use super::close::Layer;
 use super::seen::{AT_ONCE, depth_of, index, of_group};
-use super::splats::{
-    FARTHER, FORM, PER_HALF, RADIANCE, S, SIZE, Splats, TILT, U, V, WEIGHT, WIDE,
-};
+use super::splats::{FARTHER, FORM, PER_HALF, RADIANCE, S, SIZE, Splats, TILT, U, V, WEIGHT, WIDE};
 use crate::geometry::lanes::{Real, Vector};
 use crate::plan::kernel::WHOLE;
 

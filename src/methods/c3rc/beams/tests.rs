@@ -255,7 +255,11 @@ fn at_edge(inside: f64, half: f64) -> Side<f64> {
     }
     // All of the kernel is 1.
     let each = 4.0 / f64::from(steps * steps) * 3.0 / std::f64::consts::PI;
-    Side { total: side.total * each, about: [side.about[0] * each, 0.0], size: side.total * each * half }
+    Side {
+        total: side.total * each,
+        about: [side.about[0] * each, 0.0],
+        size: side.total * each * half,
+    }
 }
 
 #[test]
@@ -275,7 +279,7 @@ fn coverage_is_that_of_an_edge() {
     // In a surface, where splats happen to lie apart.
     assert_eq!(covered(&Side { total: 0.7, about: [0.05, 0.0], size: 1.05 }), 1.0);
     // A thin thing, or nearly nothing.
-    assert_eq!(covered(&Side { total: 0.1, about: [0.0; 2], size: 0.1 }), 0.1);
+    assert_eq!(covered(&Side { total: 0.125, about: [0.0; 2], size: 0.125 }), 0.125);
     assert_eq!(covered(&Side { total: 0.0, about: [0.0; 2], size: 0.0 }), 0.0);
 }
 
