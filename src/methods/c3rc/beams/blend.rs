@@ -48,6 +48,10 @@ const PER_OFF: f32 = 1.8;
 const PER_TOTAL: f32 = 0.2;
 /// Splats, px, are taken for no smaller, so that a surface's inside is whole.
 const LEAST_SIZE: f32 = 1.5;
+/// Larger splats are few and lie less evenly: for each pixel more, edges are taken to lie that much farther out, and so much at most.
+/// It takes this to hide what is behind surfels four pixels apart.
+const FEW: f32 = 2.0;
+const BEYOND: [f32; 2] = [0.02, 0.08];
 /// What covers less than the first is too little to tell from, what covers more than the second tells.
 const SOME: [f32; 2] = [0.15, 0.45];
 
@@ -152,7 +156,8 @@ impl<R: Real<Scalar = f32>> Side<R> {
         let off = (u * u + v * v).sqrt() * per_total;
         let size = (self.size * per_total).max(zero.splat(LEAST_SIZE));
         let total = self.total.min(one);
-        let inward = (total - 0.5) * PER_TOTAL + (-off + EDGE) * PER_OFF;
+        let beyond = ((size - FEW) * BEYOND[0]).max(zero).min(zero.splat(BEYOND[1]));
+        let inward = (total - 0.5) * PER_TOTAL + (beyond - off + EDGE) * PER_OFF;
         let edge = (inward * size + 0.5).max(zero).min(one);
         let many = total * size * size * (1.0 / (LEAST_SIZE * LEAST_SIZE));
         let some = ((many - SOME[0]) * (1.0 / (SOME[1] - SOME[0]))).max(zero).min(one);
