@@ -12,7 +12,7 @@ use crate::visibility::mirror_rays::{Linear, RayField, TILE};
 
 /// Rays belong to one beam if the linear function that describes its first one's neighbourhood is no farther off than this, in
 /// pixels (untuned).
-const ALIKE_PX: f32 = 4.0;
+const ALIKE_PX: f32 = 2.0;
 /// Rays of one beam start so many pixels' steps from its first one at most (untuned).
 const NEAR_PX: f32 = 60.0;
 /// The least cosine of a ray's angle with the beam's axis.
