@@ -49,9 +49,9 @@ const PER_TOTAL: f32 = 0.2;
 /// Splats, px, are taken for no smaller, so that a surface's inside is whole.
 const LEAST_SIZE: f32 = 1.5;
 /// Larger splats are few and lie less evenly: for each pixel more, edges are taken to lie that much farther out, and so much at most.
-/// It takes this to hide what is behind surfels four pixels apart.
+/// It takes this to hide what is behind surfels that lie two to four pixels apart.
 const FEW: f32 = 2.0;
-const BEYOND: [f32; 2] = [0.02, 0.08];
+const BEYOND: [f32; 2] = [0.15, 0.12];
 /// What covers less than the first is too little to tell from, what covers more than the second tells.
 const SOME: [f32; 2] = [0.15, 0.45];
 
