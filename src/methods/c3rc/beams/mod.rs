@@ -256,11 +256,11 @@ impl Work<'_> {
                             continue;
                         }
                         let corner = block.corner_of(group);
-                        // Not `map`: what a closure does may be compiled for no instruction set in particular.
-                        let done = match &seen {
-                            Some(seen) => Some(seen.blend(simd, beam, group, self.describes)),
-                            None => None,
-                        };
+                        // Not by `map`: what a closure does may be compiled for no instruction set in particular.
+                        let mut done = None;
+                        if let Some(seen) = &seen {
+                            done = Some(seen.blend(simd, beam, group, self.describes));
+                        }
                         for lane in bits(own) {
                             let [column, row] =
                                 [corner[0] + lane % GROUP, corner[1] + lane / GROUP];
